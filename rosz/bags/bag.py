@@ -16,7 +16,7 @@ from rosz.errors import BagError
 from rosz.qos import QoS
 
 __all__ = (
-    "SMALL_PAYLOAD",
+    "SMALL",
     "Attachment",
     "BagReader",
     "BagWriter",
@@ -31,7 +31,7 @@ __all__ = (
 Compression: TypeAlias = Literal["none", "lz4", "zstd", "bz2"]
 Payload: TypeAlias = bytes | bytearray | memoryview
 
-SMALL_PAYLOAD = 1024
+SMALL = 1024
 """Size in bytes below which a copy of a payload costs less than a view of it, and keeps less."""
 
 

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Self
 
-from rosz.bags.bag import SMALL_PAYLOAD, Attachment, Channel, Compression, Payload
+from rosz.bags.bag import SMALL, Attachment, Channel, Compression, Payload
 from rosz.errors import BagError, ClosedError
 from rosz.worker import Worker
 
@@ -61,7 +61,7 @@ class FilledChunk:
     def add_message(self, head: bytes, data: Payload) -> None:
         """Add a message; the payloads of large ones are not copied."""
         self._join(head)
-        if len(data) < SMALL_PAYLOAD:
+        if len(data) < SMALL:
             self._join(data)
         else:
             self.parts.append(data)

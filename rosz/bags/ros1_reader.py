@@ -19,15 +19,7 @@ from typing import Self, cast
 
 import msgspec
 
-from rosz.bags.bag import (
-    SMALL_PAYLOAD,
-    Attachment,
-    Channel,
-    Chunk,
-    Compression,
-    DamageReport,
-    Entry,
-)
+from rosz.bags.bag import SMALL, Attachment, Channel, Chunk, Compression, DamageReport, Entry
 from rosz.bags.ros1_records import (
     LENGTH,
     MAGIC,
@@ -545,7 +537,6 @@ class Ros1Reader:
         length = LENGTH.unpack_from
         channels = self.channels
         last, buffer, view, size = -1, b"", memoryview(b""), 0
-        find = buffer.find
         for run in runs:
             for when, rank, number_, place in run:
                 if number_ != last:
@@ -555,18 +546,17 @@ class Ros1Reader:
                         report(self._error(error))
                         buffer = b""
                     last, view, size = number_, memoryview(buffer), len(buffer)
-                    find = buffer.find
-                if not size:
+                            if not size:
                     continue
                 try:
                     begin = place + 4 + length(buffer, place)[0]
                     end = begin + 4 + length(buffer, begin)[0]
                 except struct.error:
                     end = size + 1
-                if end > size or find(_MESSAGE_MARK, place, begin) < 0:
+                if end > size or buffer.find(_MESSAGE_MARK, place, begin) < 0:
                     self._report_message(number_, place, report)
                     continue
-                source = buffer if end - begin < SMALL_PAYLOAD else view
+                source = buffer if end - begin < SMALL else view
                 yield Entry(channels[rank], when, source[begin + 4 : end])
 
     def _report_message(self, number_: int, place: int, report: DamageReport) -> None:
