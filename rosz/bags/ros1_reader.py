@@ -546,7 +546,7 @@ class Ros1Reader:
                         report(self._error(error))
                         buffer = b""
                     last, view, size = number_, memoryview(buffer), len(buffer)
-                            if not size:
+                if not size:
                     continue
                 try:
                     begin = place + 4 + length(buffer, place)[0]
