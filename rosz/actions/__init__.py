@@ -8,12 +8,14 @@ below them.
 """
 
 from rosz.actions.client import ActionClient, ClientGoal, CommState
+from rosz.actions.gateway import ActionGateway
 from rosz.actions.server import ActionServer, ServerGoal
 from rosz.actions.simple_server import SimpleActionServer
 from rosz.actions.types import ActionTypes
 
 __all__ = (
     "ActionClient",
+    "ActionGateway",
     "ActionServer",
     "ActionTypes",
     "ClientGoal",

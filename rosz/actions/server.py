@@ -161,6 +161,7 @@ class ActionServer:
         status_frequency: How often per second states are published; 0 for only when they change.
         status_timeout: Seconds for which the state of a goal that has ended is published.
         queue_size: Number of messages that wait to be sent.
+        has_ros2: Whether clients of ROS 2 reach it too.
 
     Attributes:
         node: As given.
@@ -185,6 +186,7 @@ class ActionServer:
         status_frequency: float = _STATUS_FREQUENCY,
         status_timeout: float = _STATUS_TIMEOUT,
         queue_size: int = _QUEUE_SIZE,
+        has_ros2: bool = True,
     ) -> None:
         self.types: ActionTypes = ActionTypes.of(action_type, node.context.types)
         self.node: Node = node
@@ -201,6 +203,7 @@ class ActionServer:
         self._cancelled_early: dict[str, int] = {}
         self._publishers: dict[str, Any] = {}
         self._others: list[Any] = []
+        self._has_ros2 = has_ros2
         self._ros2: Ros2Server | None = None
 
     def start(self) -> None:
@@ -228,7 +231,7 @@ class ActionServer:
                 period = 1 / self.status_frequency
                 self._others.append(node.timer(period, lambda _: self.publish_status()))
             self.publish_status()
-            if types.action is not None:
+            if types.action is not None and self._has_ros2:
                 self._ros2 = node.keep(
                     Ros2Server(
                         node,

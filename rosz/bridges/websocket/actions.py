@@ -8,6 +8,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rosz.actions import ActionGateway
 from rosz.bridges.websocket.messages import build
 from rosz.bridges.websocket.operations import (
     ActionFeedback,
@@ -18,7 +19,7 @@ from rosz.bridges.websocket.operations import (
 )
 from rosz.bridges.websocket.plain import Spelling, converter
 from rosz.errors import ActionError, RoszError, UsageError
-from rosz.node.goals import GoalState
+from rosz.node.goals import SEND, GoalState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +28,59 @@ if TYPE_CHECKING:
     from rosz.node.action_client import ActionClient, ClientGoal
     from rosz.node.action_server import ActionServer, ServerGoal
 
-__all__ = ("SentGoals", "ServedActions")
+__all__ = ("Gateways", "SentGoals", "ServedActions")
+
+_GOAL = "/goal"
+
+
+class Gateways:
+    """Servers of ROS 2 that clients reach by actionlib's topics.
+
+    Args:
+        node: Node that has the topics.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._lock = threading.Lock()
+        self._known: dict[str, tuple[ActionGateway, set[object]]] = {}
+
+    def want(self, topic: str, cls: type[Any], client: object) -> None:
+        """See that goals which a client publishes reach a server of ROS 2, if only that is there.
+
+        Args:
+            topic: Topic of the client, which may be one for goals.
+            cls: Class of its messages.
+            client: The client.
+
+        Raises:
+            RoszError: The definition of the action is not found.
+        """
+        name, kind = topic.removesuffix(_GOAL), cls._type
+        if name == topic or not kind.endswith("ActionGoal"):
+            return
+        with self._lock:
+            if name in self._known:
+                self._known[name][1].add(client)
+                return
+            view = self._node.context.graph.refresh()
+            if view.subscriptions(topic) or not view.servers(f"{name}/{SEND}"):
+                return
+            action = self._node.context.types.message(kind.removesuffix("Goal"))
+            gateway = ActionGateway(self._node, name, action)
+            if gateway.start():
+                self._known[name] = gateway, {client}
+            else:
+                gateway.close()
+
+    def leave(self, client: object) -> None:
+        """Close the gateways that no other client needs."""
+        with self._lock:
+            for name, (gateway, clients) in list(self._known.items()):
+                clients.discard(client)
+                if not clients:
+                    del self._known[name]
+                    gateway.close()
 
 
 class SentGoals:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.bridges.websocket import operations as ops
-from rosz.bridges.websocket.actions import SentGoals, ServedActions
+from rosz.bridges.websocket.actions import Gateways, SentGoals, ServedActions
 from rosz.bridges.websocket.messages import build_from_json
 from rosz.bridges.websocket.outbox import Feed, Outbox
 from rosz.bridges.websocket.plain import Spelling
@@ -43,6 +43,7 @@ class Shared(msgspec.Struct, frozen=True):
         node: The node of the bridge.
         gate: Permissions of the clients.
         topics: Publishers and subscriptions.
+        gateways: Servers of ROS 2 by actionlib's topics.
         rosapi: The services about the system.
         worker: Threads for what takes long: calls and goals.
         spelling: Whose names of types and fields a client gets that has not shown its own.
@@ -52,6 +53,7 @@ class Shared(msgspec.Struct, frozen=True):
     node: Node
     gate: Gate
     topics: Topics
+    gateways: Gateways
     rosapi: RosApi
     worker: Worker[Callable[[], object]]
     spelling: Spelling = "ros1"
@@ -202,6 +204,7 @@ class Connection:
         for feed in feeds:
             self._shared.topics.unsubscribe(feed)
         self._shared.topics.unadvertise(self)
+        self._shared.gateways.leave(self)
         for part in (self._services, self._actions, self._calls, self._goals):
             part.close()
 
@@ -248,6 +251,7 @@ class Connection:
                 self._publishers[topic] = topics.advertise(
                     topic, cls, latch=operation.latch, client=self
                 )
+        self._shared.gateways.want(topic, cls, self)
 
     def _unadvertise(self, operation: ops.Unadvertise) -> None:
         topic = self._shared.node.resolve(operation.topic)
@@ -269,6 +273,7 @@ class Connection:
             self._advertise(made)
             self._spelling = spelling if not operation.type else self._spelling
         publisher = self._publishers[topic]
+        self._shared.gateways.want(topic, publisher.message_type, self)
         now = self._shared.node.now()
         cls = publisher.message_type
         publisher.publish(build_from_json(cls, operation.msg, self._spelling, now))

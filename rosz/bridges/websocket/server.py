@@ -16,6 +16,7 @@ import msgspec
 
 from rosz.bridges.admission import Admission
 from rosz.bridges.gate import Gate
+from rosz.bridges.websocket.actions import Gateways
 from rosz.bridges.websocket.connection import Connection, Shared
 from rosz.bridges.websocket.operations import fragments, png
 from rosz.bridges.websocket.outbox import Encodings, Message, Outbox
@@ -110,7 +111,14 @@ class WebsocketBridge:
         )
         topics = Topics(node, Encodings(limits.encoded))
         self._shared = Shared(
-            node, gate, topics, RosApi(node), self._calls, spelling, admission.password
+            node,
+            gate,
+            topics,
+            Gateways(node),
+            RosApi(node),
+            self._calls,
+            spelling,
+            admission.password,
         )
         self._handlers = ThreadPoolExecutor(_HANDLERS, "rosz-websocket")
         self._loop = asyncio.new_event_loop()

@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from network import TIMEOUT, Network
+from network import TIMEOUT, Network, eventually
 from websockets.sync.client import ClientConnection, connect
 
+from rosz.actions import ActionServer, SimpleActionServer
 from rosz.bridges.websocket import WebsocketBridge
+from rosz.msgs.actionlib.action import Test
 from rosz.node import Node
 
-__all__ = ("Bridge", "Client", "bridge_on")
+__all__ = ("Bridge", "Client", "Doubling", "bridge_on")
 
 
 class Bridge:
@@ -70,3 +72,31 @@ def bridge_on(network: Network, **options: Any) -> Iterator[Bridge]:
     node = network.node("bridge")
     with WebsocketBridge(node, port=0, **options) as server:
         yield Bridge(network, node, server)
+
+
+class Doubling:
+    """What a server does: it doubles positive numbers, and waits for the end of others."""
+
+    def __init__(self, node: Node) -> None:
+        node.action_server("native", Test, self._execute_native)
+        self._classic = SimpleActionServer(
+            ActionServer(node, "classic", node.context.types.message("actionlib/TestAction")),
+            self._execute,
+        )
+        self._classic.start()
+
+    def _execute_native(self, goal: Any) -> None:
+        if goal.request.goal < 0:
+            goal.wait_for_cancel(TIMEOUT)
+            goal.canceled(Test.Result(5))
+            return
+        goal.feedback(Test.Feedback(7))
+        goal.succeed(Test.Result(2 * goal.request.goal))
+
+    def _execute(self, goal: Any) -> None:
+        if goal.goal < 0:
+            eventually(self._classic.is_preempt_requested, "the request to end")
+            self._classic.set_preempted(Test.Result(5))
+            return
+        self._classic.publish_feedback(Test.Feedback(7))
+        self._classic.set_succeeded(Test.Result(2 * goal.goal))

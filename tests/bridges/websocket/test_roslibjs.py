@@ -14,13 +14,17 @@ import pytest
 from network import TIMEOUT, Network, Program, eventually, free_port
 
 from rosz.bridges.websocket import WebsocketBridge
+from rosz.msgs.actionlib.action import Test
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.sensor_msgs.msg import LaserScan
 from rosz.msgs.std_msgs.msg import Header, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node
+from rosz.node.goals import GoalState
 from rosz.transforms import StaticTransformBroadcaster
+
+from .bridge import Doubling, bridge_on
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(180)]
 
@@ -92,6 +96,58 @@ process.stdin.on("data", () => process.exit(0));
 """
 
 
+ACTIONS = """
+import * as ROSLIB from "roslib";
+const [port] = process.argv.slice(2);
+const ros = new ROSLIB.Ros({ url: `ws://127.0.0.1:${port}` });
+await new Promise((done) => ros.on("connection", done));
+const type = "actionlib/TestAction";
+const say = (...words) => console.log(...words);
+
+const classic = new ROSLIB.SimpleActionServer({ ros, serverName: "/simple", actionName: type });
+classic.on("goal", (goal) => {
+  if (goal.goal < 0) return;
+  classic.sendFeedback({ feedback: 7 });
+  classic.setSucceeded({ result: 2 * goal.goal });
+});
+classic.on("cancel", () => classic.setPreempted());
+for (const serverName of ["/native", "/classic", "/simple"]) {
+  const actionClient = new ROSLIB.ActionClient({ ros, serverName, actionName: type });
+  for (const number of [13, -1]) {
+    const goal = new ROSLIB.Goal({ actionClient, goalMessage: { goal: number } });
+    goal.on("feedback", (feedback) => say(serverName, "feedback", feedback.feedback));
+    if (number < 0) {
+      goal.on("status", (status) => status.status === 1 && goal.cancel());
+    }
+    const ended = new Promise((done) => goal.on("status", (status) =>
+      [2, 3].includes(status.status) && done(status.status)));
+    const result = new Promise((done) => goal.on("result", done));
+    goal.send();
+    say(serverName, (await result).result, await ended);
+  }
+}
+
+const served = new ROSLIB.Action({ ros, name: "/page", actionType: "actionlib/Test" });
+served.advertise((goal, id) => {
+  if (goal.goal === 0) served.setFailed(id);
+  if (goal.goal > 0) {
+    served.sendFeedback(id, { feedback: 7 });
+    served.setSucceeded(id, { result: 2 * goal.goal });
+  }
+  if (goal.goal < 0) say("waits");
+}, (id) => served.setCanceled(id, { result: 5 }));
+const native = new ROSLIB.Action({ ros, name: "/native", actionType: "actionlib/Test" });
+await new Promise((done) => {
+  const id = native.sendGoal({ goal: -1 }, done, undefined, done);
+  native.cancelGoal(id);
+}).then((result) => say("canceled", String(result)));
+await new Promise((done) => native.sendGoal({ goal: 6 }, done))
+  .then((result) => say("native", result.result));
+say("ready");
+process.stdin.on("data", () => { served.unadvertise(); process.exit(0); });
+"""
+
+
 @pytest.fixture(scope="module")
 def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("roslib")
@@ -110,6 +166,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if done.returncode:
         pytest.skip(f"npm cannot install roslib: {done.stderr[-200:]}")
     (folder / "page.js").write_text(SCRIPT)
+    (folder / "actions.js").write_text(ACTIONS)
     return folder / "page.js"
 
 
@@ -180,3 +237,36 @@ def test_a_page(script: Path, network: Network) -> None:
     finally:
         program.close()
         server.close()
+
+
+def test_actions_of_a_page(script: Path, network: Network) -> None:
+    """Actions of ROS 1 and of ROS 2: a page has clients and servers of both."""
+    node = network.node("other")
+    Doubling(node)
+    node_js = shutil.which("node")
+    assert node_js is not None
+    with bridge_on(network) as bridge:
+        bridge.wait_for_service("/native/_action/send_goal")
+        command = [node_js, str(script.parent / "actions.js"), str(bridge.server.port)]
+        program = Program(command, network.variables(), script.parent)
+        try:
+            program.wait_for("ready", 4 * TIMEOUT)
+            for name, last in (("/native", 5), ("/classic", 5), ("/simple", 0)):
+                assert f"{name} 26 3" in program.lines
+                assert f"{name} {last} 2" in program.lines
+                assert f"{name} feedback 7" in program.lines
+            assert "native 12" in program.lines
+            canceled = next(line for line in program.lines if line.startswith("canceled"))
+            assert '"result":5' in canceled.replace("\\", "")
+            client = node.action_client("page", Test)
+            client.wait_for_server(TIMEOUT)
+            goal = client.send(Test.Goal(4), timeout=TIMEOUT)
+            assert [one.feedback for one in goal] == [7]
+            assert goal.result(TIMEOUT).result == 8
+            assert client.send(Test.Goal(0), timeout=TIMEOUT).wait(TIMEOUT) is GoalState.ABORTED
+            endless = client.send(Test.Goal(-1), timeout=TIMEOUT)
+            program.wait_for("waits")
+            assert endless.cancel(TIMEOUT)
+            assert endless.wait(TIMEOUT) is GoalState.CANCELED
+        finally:
+            program.close()

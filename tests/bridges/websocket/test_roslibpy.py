@@ -10,12 +10,14 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network
 
+from rosz.actions import ActionClient
+from rosz.msgs.actionlib.action import Test as TestAction
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import PoseStamped
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import SetBool
 
-from .bridge import Bridge, bridge_on
+from .bridge import Bridge, Doubling, bridge_on
 
 pytestmark = pytest.mark.system
 
@@ -141,3 +143,69 @@ def test_goals(bridge: Bridge) -> None:
     heard.set()
     assert program.exit_code(TIMEOUT) == 0, program.output
     assert "result 4 [0, 1, 1]" in program.lines
+
+
+ACTIONLIB = """
+    import sys, threading
+    import roslibpy
+    from roslibpy.ros1.actionlib import ActionClient, Goal, SimpleActionServer
+    roslibpy.set_default_transport(sys.argv[2])
+    ros = roslibpy.Ros("127.0.0.1", int(sys.argv[1]))
+    ros.run(timeout=15)
+    def states(goal):
+        reached = [threading.Event() for _ in range(10)]
+        goal.on("status", lambda status: reached[status["status"]].set())
+        return reached
+    served = SimpleActionServer(ros, "/doubled", "actionlib/TestAction")
+    def execute(goal):
+        if goal["goal"] < 0:
+            while not served.is_preempt_requested():
+                pass
+            served.set_preempted()
+        else:
+            served.set_succeeded({"result": 2 * goal["goal"]})
+    served.start(execute)
+    for name in "/native", "/classic", "/doubled":
+        client = ActionClient(ros, name, "actionlib/TestAction")
+        goal = Goal(client, {"goal": 13})
+        goal.on("feedback", lambda one: print("feedback", one["feedback"]))
+        reached = states(goal)
+        goal.send()
+        print(name, goal.wait(15)["result"], reached[3].wait(15))
+        goal = Goal(client, {"goal": -1})
+        reached = states(goal)
+        goal.send()
+        reached[1].wait(15)
+        goal.cancel()
+        print(name, goal.wait(15)["result"], reached[2].wait(15))
+        client.dispose()
+    print("ready")
+    sys.stdin.readline()
+    ros.terminate()
+"""
+
+
+@pytest.mark.parametrize("transport", ["twisted", "asyncio"])
+def test_actionlib(bridge: Bridge, transport: str) -> None:
+    """A program is client and server of ROS 1's actions; rosz has either kind at the other end."""
+    node = bridge.network.node("server")
+    Doubling(node)
+    bridge.wait_for_service("/native/_action/send_goal")
+    program = bridge.network.program(ACTIONLIB, str(bridge.server.port), transport)
+    program.wait_for("ready", 4 * TIMEOUT)
+    assert [line for line in program.lines if line.startswith("/")] == [
+        "/native 26 True",
+        "/native 5 True",
+        "/classic 26 True",
+        "/classic 5 True",
+        "/doubled 26 True",
+        "/doubled 0 True",
+    ]
+    assert program.lines.count("feedback 7") == 2
+    client = ActionClient(node, "doubled", node.context.types.message("actionlib/TestAction"))
+    assert client.wait_for_server(TIMEOUT)
+    goal = client.send(TestAction.Goal(4))
+    assert goal.wait(TIMEOUT)
+    assert goal.result.result == 8
+    program.say("end")
+    assert program.exit_code(TIMEOUT) == 0
