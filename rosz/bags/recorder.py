@@ -2,7 +2,8 @@
 
 A message is never decoded, unless the format needs another layout. Each publisher is a channel of
 its own, with its QoS and its node. A type that is not known here is described by the publisher's
-node; until that has replied, the messages of the channel wait in memory.
+node. The messages of the channel wait in memory until that has replied, and for a second at most
+until the token of the publisher is known.
 
 Messages are taken from Zenoh at once, whatever the disk does, and wait in one buffer that is
 bounded by bytes. One thread writes them from there.
@@ -27,7 +28,7 @@ from rosz.wire import NO_HASH, Kind, Token, format_token, gid
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
-    from rosz.graph import Followed, View
+    from rosz.graph import Followed
     from rosz.node import MessageInfo, Node
 
 __all__ = ("Recorder",)
@@ -35,6 +36,8 @@ __all__ = ("Recorder",)
 _QOS = QoS(depth=8192)
 """Samples of a topic that wait until they are taken from Zenoh, which takes no time but that of a
 busy processor."""
+_TOKEN_TIMEOUT = 1.0
+"""Time that messages wait for the token of their publisher, which tells its QoS and its node."""
 _DEFINITION_TIMEOUT = 10.0
 _CLOSE_TIMEOUT = 600.0
 _RULE = "=" * 80
@@ -46,11 +49,13 @@ _Row = tuple[int, Payload, int | None, int]
 class _Source:
     """One publisher: its track once its definition is known, and what waits until then."""
 
-    def __init__(self, topic: str, info: MessageInfo, token: Token | None) -> None:
+    def __init__(self, topic: str, info: MessageInfo) -> None:
         self.topic = topic
+        self.gid = info.gid
         self.type_name = info.type_name
         self.type_hash = info.type_hash
-        self.token = token
+        self.token: Token | None = None
+        self.defined = False
         self.track: Track | None = None
         self.held: deque[_Row] = deque()
         self.lock = threading.Lock()
@@ -113,10 +118,10 @@ class Recorder:
         self._subscribed: dict[str, Subscription[bytes]] = {}
         self._publishers: dict[str, Followed] = {}
         self._sources: dict[bytes, _Source] = {}
-        self._unknown: dict[tuple[str, str, str], tuple[View, _Source]] = {}
         self._counts: Counter[str] = Counter()
         self._warned: set[str] = set()
         self._worker: Worker[Callable[[], object]] = Worker("rosz-bag-recorder", threads=4)
+        self._late: Worker[Callable[[], object]] = Worker("rosz-bag-tokens")
         self.ended: threading.Event = ended or threading.Event()
         self.lost: int = 0
         self.error: BagError | None = None
@@ -145,6 +150,7 @@ class Recorder:
             try:
                 publishers = graph.follow_entities(Kind.PUBLISHER, topic)
                 self._publishers[topic] = self._node.keep(publishers)
+                publishers.listen(self._learn, history=False)
                 subscription: Subscription[bytes] = Subscription(
                     self._node,
                     topic,
@@ -245,36 +251,48 @@ class Recorder:
     # Channels.
 
     def _source(self, topic: str, info: MessageInfo) -> _Source:
-        """Return the publisher of a message; one without a token as long as that is not there."""
-        view = self._publishers[topic].view()
-        key = (topic, info.type_name, info.type_hash)
-        known = self._unknown.get(key)
-        if known is not None and known[0] is view:
-            return known[1]
-        for token in view.publishers(topic):
-            if gid(format_token(token)) == info.gid:
-                source = self._sources[info.gid] = _Source(topic, info, token)
-                self._define(source)
-                return source
-        source = _Source(topic, info, None) if known is None else known[1]
-        self._unknown[key] = view, source
-        if known is None:
-            self._define(source)
+        """Return the publisher of a first message, which may come before its token."""
+        source = self._sources[info.gid] = _Source(topic, info)
+        # What is known is looked at after `_learn` can find the source, so that none is missed.
+        token = self._find_token(source)
+        if token is not None:
+            self._define(source, token)
+        else:
+            self._late.later(_TOKEN_TIMEOUT, partial(self._define, source, None))
         return source
 
-    def _define(self, source: _Source) -> None:
+    def _find_token(self, source: _Source) -> Token | None:
+        found = self._publishers[source.topic].view().publishers(source.topic)
+        return next((one for one in found if gid(format_token(one)) == source.gid), None)
+
+    def _learn(self, token: Token, alive: bool) -> None:
+        """Begin to record the publisher of a token, if its messages wait for that."""
+        source = self._sources.get(gid(format_token(token))) if alive else None
+        if source is not None:
+            self._worker.submit(partial(self._define, source, token))
+
+    def _define(self, source: _Source, token: Token | None) -> None:
         """Begin to record a publisher, with its definition from here or from its node."""
-        types = self._node.context.types
-        try:
-            cls = types.message(source.type_name)
-        except RoszError:
-            cls = None
-        if cls is not None and source.type_hash in {NO_HASH, cls._type_hash}:
-            self._begin(source, cls._full_text, cls._md5sum)
-        elif source.token is None:
+        with source.lock:
+            if source.defined:
+                return
+            source.defined, source.token = True, token
+        known = self._definition(source)
+        if known is not None:
+            self._begin(source, *known)
+        elif token is None:
             self._begin(source, "", "")
         else:
-            self._worker.submit(partial(self._request_definition, source, source.token))
+            self._worker.submit(partial(self._request_definition, source, token))
+
+    def _definition(self, source: _Source) -> tuple[str, str] | None:
+        """Return the definition and the md5 of a publisher's type, if it is the one known here."""
+        try:
+            cls = self._node.context.types.message(source.type_name)
+        except RoszError:
+            return None
+        same = source.type_hash in {NO_HASH, cls._type_hash}
+        return (cls._full_text, cls._md5sum) if same else None
 
     def _request_definition(self, source: _Source, token: Token) -> None:
         try:
@@ -314,14 +332,16 @@ class Recorder:
         if self._listener is not None:
             self._listener.close()
         self._worker.close()
+        self._late.close()
         with self._lock:
             for subscription in self._subscribed.values():
                 subscription.close()
         self._buffer.close()
         self._writer.close(_CLOSE_TIMEOUT)
-        for source in [*self._sources.values(), *(one for _, one in self._unknown.values())]:
-            if source.track is None:
-                self._begin(source, "", "")  # its node has not replied in time
+        for source in list(self._sources.values()):
+            if source.track is None:  # its token has not come in time, or its node not replied
+                source.token = source.token or self._find_token(source)
+                self._begin(source, *(self._definition(source) or ("", "")))
 
     def __enter__(self) -> Self:
         return self

@@ -228,6 +228,36 @@ def test_topics_that_appear_later(network: Network) -> None:
         assert {f"/t{number}" for number in range(5)} <= {one.topic for one in reader.channels}
 
 
+def test_a_publisher_is_one_channel_from_its_first_message_on(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosz.bags.recorder._TOKEN_TIMEOUT", 60.0)
+    topics = [f"/t{number}" for number in range(4)]
+    node, ended = network.node("talker"), threading.Event()
+    publishers = [node.publisher(topic, String) for topic in topics]
+
+    def talk() -> None:
+        while not ended.wait(0.0005):
+            for publisher in publishers:
+                publisher.publish(String(data="a"))
+
+    talker = threading.Thread(target=talk)
+    talker.start()
+    try:
+        for number in range(3):
+            with recording(network, f"{number}.mcap", *topics) as made:
+                made.wait_for_count(400)
+            with open_reader(made.files.done[0]) as reader:
+                found = [one for one in reader.channels if one.topic in topics]
+            made.node.close()
+            assert sorted((one.topic, one.node) for one in found) == [
+                (topic, "/talker") for topic in topics
+            ]
+    finally:
+        ended.set()
+        talker.join()
+
+
 def test_each_split_begins_with_latched_messages_and_parameters(network: Network) -> None:
     node = network.node("talker")
     node.params.set("/gain", 5)
