@@ -76,9 +76,9 @@ class CallReader:
         self._head: tuple[str, int, bool] | None = None
 
     @property
-    def pending(self) -> int:
-        """Number of bytes that have been received of the next call."""
-        return len(self._data)
+    def is_idle(self) -> bool:
+        """Whether nothing of the next call has been received."""
+        return self._head is None and not self._data
 
     def feed(self, data: bytes | memoryview) -> Iterator[Call]:
         """Yield the calls that are complete with more bytes of the stream.

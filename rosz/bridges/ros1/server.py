@@ -229,7 +229,7 @@ class Incoming:
         """Close a connection that has begun something and does not come to its end."""
         if self.stream.is_closed or self._greeted:
             return
-        if self._calls is not None and not self._calls.pending:
+        if self._calls is not None and self._calls.is_idle:
             self._check_later()
             return
         log.warning(

@@ -9,6 +9,7 @@ import socket
 import struct
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -252,6 +253,16 @@ def test_a_node_of_rosz_answers_ros_1s_questions(world: World) -> None:
         assert ended.wait(TIMEOUT)
 
 
+def _post(body: str) -> bytes:
+    return f"POST / HTTP/1.1\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode()
+
+
+_LAUGHS = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
+_BOMB = f'<!DOCTYPE a [<!ENTITY l0 "ha">{_LAUGHS}]><methodCall>&l9;</methodCall>'
+_SILENT = _post("x")[:-1]
+_HUGE = f"<params><param><value><int>{'9' * 1_000_000}</int></value></param></params>"
+
+
 def test_what_is_no_program_of_ros_1_costs_one_line(
     world: World, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -259,6 +270,9 @@ def test_what_is_no_program_of_ros_1_costs_one_line(
         (struct.pack("<I", 0xFFFFFFFF), "a length of 4294967295 bytes"),
         (b"\4\0\0\0\xff\xff\xff\xff", "a field of 4294967295 bytes"),
         (b"POST / HTTP/1.1\r\nContent-Length: x\r\n\r\n", "Content-length is 'x'"),
+        (_post(_BOMB), "a document type is not allowed"),
+        (_post("<value><array><data>" * 100_000), "values are nested too deeply"),
+        (_post(_HUGE), "integer string conversion"),
     ):
         caplog.clear()
         with socket.create_connection(("127.0.0.1", world.bridge.port), TIMEOUT) as sock:
@@ -267,6 +281,45 @@ def test_what_is_no_program_of_ros_1_costs_one_line(
                 pass
         assert [words in record.getMessage() for record in caplog.records] == [True]
     assert _refusal(world, "/t", "/x") == "node '/x' is not registered as a subscriber of '/t'"
+
+
+def test_a_slow_program_costs_one_line_and_nobody_waits(
+    world: World, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with ExitStack() as stack:
+        other = stack.enter_context(ServerProxy(f"http://127.0.0.1:{world.port}/"))
+        other.getPid("/x")
+        monkeypatch.setattr("rosz.bridges.ros1.server._TIMEOUT", 1.0)
+        slow = {
+            stack.enter_context(socket.create_connection(("127.0.0.1", world.port))): text
+            for text in (b"\xff\0\0\0", b"POST / HTTP/1.1\r\n", _post("x" * 1000)[:-999], _SILENT)
+        }
+        peers = [f"127.0.0.1:{sock.getsockname()[1]}" for sock in slow]
+        for sock, text in slow.items():
+            sock.sendall(text)
+            sock.settimeout(0.02)
+
+        def closed(sock: socket.socket) -> bool:
+            try:
+                if slow[sock] is not _SILENT:
+                    sock.sendall(b"x")
+                return sock.recv(100) == b""
+            except TimeoutError:
+                return False
+            except OSError:
+                return True
+
+        def all_closed() -> bool:
+            assert other.getPid("/x")
+            for sock in [sock for sock in slow if closed(sock)]:
+                del slow[sock]
+            return not slow
+
+        eventually(all_closed, "the end of slow connections", 2 * TIMEOUT)
+    told = [record.getMessage() for record in caplog.records]
+    assert sorted(line for line in told if any(peer in line for peer in peers)) == sorted(
+        f"closed the connection of {peer}: nothing complete in 1 s" for peer in peers
+    )
 
 
 def test_a_port_that_is_taken_is_named(world: World) -> None:
