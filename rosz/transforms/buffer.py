@@ -6,7 +6,7 @@ import itertools
 import math
 import threading
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Collection, Container, Iterator
 from typing import NamedTuple
 
 from rosz.errors import (
@@ -18,7 +18,7 @@ from rosz.errors import (
     TransformError,
 )
 from rosz.node import Clock
-from rosz.transforms.poses import IDENTITY, Pose, compose, compose_all, interpolate, invert
+from rosz.transforms.poses import Pose, Step, compose, compose_steps, invert
 
 __all__ = ("Buffer", "History", "Place")
 
@@ -28,6 +28,8 @@ _MAX_DEPTH = 1000
 
 _LOOP = "The tf tree is invalid because it contains a loop."
 _UNIT_TOLERANCE = 1e-3
+_MOST_DROPPED = 64
+"""Places that are too old, and are kept at least until they are removed together."""
 
 
 class Place(NamedTuple):
@@ -52,6 +54,7 @@ class History:
         self.static: bool = static
         self._authority: str | Callable[[], str] = ""
         self._length = length_ns
+        self._first = 0  # those before it are too old
         self._stamps: list[int] = []
         self._places: list[Place] = []
 
@@ -71,15 +74,20 @@ class History:
         if self.static:
             self._stamps, self._places = [stamp], [place]
             return True
-        if self._stamps and stamp < self._stamps[-1] - self._length:
-            return False
-        index = bisect_left(self._stamps, stamp)
-        if index < len(self._stamps) and self._stamps[index] == stamp:
-            return False
-        self._stamps.insert(index, stamp)
-        self._places.insert(index, place)
-        old = bisect_left(self._stamps, self._stamps[-1] - self._length)
-        del self._stamps[:old], self._places[:old]
+        stamps, places = self._stamps, self._places
+        if not stamps or stamp > stamps[-1]:
+            stamps.append(stamp)
+            places.append(place)
+        else:
+            index = bisect_left(stamps, stamp, self._first)
+            if stamp < stamps[-1] - self._length or stamps[index] == stamp:
+                return False
+            stamps.insert(index, stamp)
+            places.insert(index, place)
+        self._first = first = bisect_left(stamps, stamps[-1] - self._length, self._first)
+        if first > _MOST_DROPPED and first > len(stamps) // 32:  # each time would take too long
+            del stamps[:first], places[:first]
+            self._first = 0
         return True
 
     @property
@@ -90,44 +98,43 @@ class History:
     @property
     def oldest(self) -> int:
         """Time of the oldest place in nanoseconds; 0 for a static frame."""
-        return 0 if self.static else self._stamps[0]
+        return 0 if self.static else self._stamps[self._first]
 
     @property
     def rate(self) -> float:
         """Places per second, as tf2 calculates it."""
-        return len(self._stamps) / max((self.latest - self.oldest) / 1e9, 1e-4)
+        return (len(self._stamps) - self._first) / max((self.latest - self.oldest) / 1e9, 1e-4)
 
     @property
     def newest(self) -> Place:
         """The newest place."""
         return self._places[-1]
 
-    def at(self, stamp: int) -> tuple[str, Pose]:
-        """Return the parent and the pose at a time, interpolated if necessary.
-
-        Raises:
-            ExtrapolationNeeded: The time is before or after all known places.
-        """
+    def at(self, stamp: int) -> tuple[str, Step] | None:
+        """Return the parent at a time and the step to it; None if the time is not known."""
+        places = self._places
         if self.static:
-            return self._places[0]
-        stamps, places = self._stamps, self._places
-        after = bisect_right(stamps, stamp)
+            parent, pose = places[0]
+            return parent, (pose, pose, 0.0)
+        stamps = self._stamps
+        after = bisect_right(stamps, stamp, self._first)
+        if after == self._first:
+            return None
         before = after - 1
-        if not after:
-            raise ExtrapolationNeeded(self._beyond(stamp))
         began = stamps[before]
-        if began == stamp:
-            return places[before]
-        if after == len(stamps):
-            raise ExtrapolationNeeded(self._beyond(stamp))
         parent, pose = places[before]
+        if began == stamp:
+            return parent, (pose, pose, 0.0)
+        if after == len(stamps):
+            return None
         parent_after, pose_after = places[after]
         if parent != parent_after:
-            return parent, pose
-        return parent, interpolate(pose, pose_after, (stamp - began) / (stamps[after] - began))
+            return parent, (pose, pose, 0.0)
+        return parent, (pose, pose_after, (stamp - began) / (stamps[after] - began))
 
-    def _beyond(self, stamp: int) -> str:
-        first, last = self._stamps[0], self._stamps[-1]
+    def why_not(self, stamp: int) -> str:
+        """Return why a time is not known."""
+        first, last = self.oldest, self.latest
         if first == last:
             return (
                 f"Lookup would require extrapolation at time {_seconds(stamp)}, but only time"
@@ -240,14 +247,25 @@ class Buffer:
             FramesNotConnected: The frames belong to separate trees.
             ExtrapolationNeeded: The time is before or after all known transforms.
         """
+        up, down, stamp = self._find(target, source, stamp)
+        pose = compose_steps(up)
+        if down:
+            outer = invert(compose_steps(down))
+            pose = compose(outer, pose) if up else outer
+        return pose, stamp
+
+    def _find(
+        self, target: str, source: str, stamp: int
+    ) -> tuple[Collection[Step], Collection[Step], int]:
+        """Return the steps to the common ancestor, from the source and the target, and the time."""
         with self._lock:
             self._check_frame(target, "target_frame")
             self._check_frame(source, "source_frame")
             if stamp == 0:
                 stamp = self.latest_common(target, source)
             if target == source:
-                return IDENTITY, stamp
-            return self._walk(target, source, stamp), stamp
+                return (), (), stamp
+            return *self._way(target, source, stamp), stamp
 
     def lookup_full(
         self, target: str, target_stamp: int, source: str, source_stamp: int, fixed: str
@@ -299,7 +317,7 @@ class Buffer:
             if not self.has(name):
                 return f"canTransform: {role} {name} does not exist."
         try:
-            self.lookup(target, source, stamp)
+            self._find(target, source, stamp)
         except TransformError as error:
             return str(error)
         return ""
@@ -391,40 +409,38 @@ class Buffer:
 
     def _climb(
         self, frame: str, stamp: int, ends: Container[str]
-    ) -> tuple[dict[str, Pose], str, str]:
+    ) -> tuple[dict[str, Step], str, str]:
         """Go up from a frame to the first of some others, or to the root.
 
         Returns:
-            The pose of each frame on the way in its parent, the frame at which the way ends, and
+            The step of each frame on the way to its parent, the frame at which the way ends, and
             why it ends there if it is neither.
         """
         frames = self._frames
-        steps: dict[str, Pose] = {}
+        steps: dict[str, Step] = {}
         for _ in range(_MAX_DEPTH):
             history = frames.get(frame)
             if history is None or frame in ends:
                 return steps, frame, ""
-            try:
-                parent, steps[frame] = history.at(stamp)
-            except ExtrapolationNeeded as error:
-                return steps, frame, str(error)
+            found = history.at(stamp)
+            if found is None:
+                return steps, frame, history.why_not(stamp)
+            parent, steps[frame] = found
             frame = parent
         raise TransformError(_LOOP)
 
-    def _walk(self, target: str, source: str, stamp: int) -> Pose:
-        """Go up from both frames to their common ancestor."""
+    def _way(
+        self, target: str, source: str, stamp: int
+    ) -> tuple[Collection[Step], Collection[Step]]:
+        """Return the steps from the source, and from the target, to their common ancestor."""
         up, top, beyond = self._climb(source, stamp, (target,))
         if top == target:
-            return compose_all(up.values())
+            return up.values(), ()
         known = {*up, top}
         down, shared, why = self._climb(target, stamp, known)
-        if shared == source:
-            return invert(compose_all(down.values()))
         if shared in known:
-            inner = compose_all(
-                pose for _, pose in itertools.takewhile(lambda step: step[0] != shared, up.items())
-            )
-            return compose(invert(compose_all(down.values())), inner)
+            way = itertools.takewhile(lambda step: step[0] != shared, up.items())
+            return [step for _, step in way], down.values()
         beyond = why or beyond  # the last one counts, as in tf2
         if beyond:
             raise ExtrapolationNeeded(
@@ -447,13 +463,17 @@ def _check(parent: str, child: str, pose: Pose) -> None:
         raise TransformArgument(f"the transform of '{child}' has no frame_id, and is ignored")
     if parent == child:
         raise TransformArgument(f"the transform of '{child}' to itself is ignored")
+    (px, py, pz), (x, y, z, w) = pose
+    square = x * x + y * y + z * z + w * w
+    unit = abs(square - 1.0) <= _UNIT_TOLERANCE * 2
+    if unit and math.isfinite(px + py + pz):  # which is fast, and nearly always so
+        return
     numbers = (*pose.translation, *pose.rotation)
     if not all(math.isfinite(number) for number in numbers):
         raise TransformArgument(
             f"the transform of '{child}' has a number that is not finite: {numbers}"
         )
-    square = sum(part * part for part in pose.rotation)
-    if abs(square - 1.0) > _UNIT_TOLERANCE * 2:
+    if not unit:
         raise TransformArgument(
             f"the transform of '{child}' has a rotation of length {math.sqrt(square):g}; expected 1"
         )

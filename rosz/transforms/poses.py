@@ -11,12 +11,12 @@ __all__ = (
     "IDENTITY",
     "Pose",
     "Quaternion",
+    "Step",
     "Vector",
     "compose",
-    "compose_all",
+    "compose_steps",
     "describe_pose",
     "from_rpy",
-    "interpolate",
     "invert",
     "rotate",
     "to_rpy",
@@ -35,6 +35,9 @@ class Pose(NamedTuple):
     translation: Vector
     rotation: Quaternion
 
+
+Step = tuple[Pose, Pose, float]
+"""A pose, the next one, and how far between the two: 0 for the first, less than 1."""
 
 _new_pose = tuple.__new__
 """Makes a pose without the checks of its class."""
@@ -57,15 +60,35 @@ def rotate(rotation: Quaternion, vector: Vector) -> Vector:
 
 def compose(outer: Pose, inner: Pose) -> Pose:
     """Return the pose that applies the inner one first, then the outer one."""
-    return compose_all((inner, outer))
+    return compose_steps(((inner, inner, 0.0), (outer, outer, 0.0)))
 
 
-def compose_all(poses: Iterable[Pose]) -> Pose:
-    """Return the pose that applies the first one first, and the last one last."""
-    # `compose`, written out for numbers: look-ups spend most of their time here.
+def compose_steps(steps: Iterable[Step]) -> Pose:
+    """Return the pose that applies the first step first, and the last one last.
+
+    The rotation between two poses is the smaller one of the two that are possible.
+    """
+    # Written out for numbers: look-ups spend most of their time here.
     x = y = z = bx = by = bz = 0.0
     bw = 1.0
-    for (px, py, pz), (ax, ay, az, aw) in poses:
+    for (place, rotation), after, fraction in steps:
+        px, py, pz = place
+        ax, ay, az, aw = rotation
+        if fraction:
+            (qx, qy, qz), (cx, cy, cz, cw) = after
+            px, py, pz = (
+                px + (qx - px) * fraction,
+                py + (qy - py) * fraction,
+                pz + (qz - pz) * fraction,
+            )
+            cosine = ax * cx + ay * cy + az * cz + aw * cw
+            if -_NEARLY_ONE <= cosine <= _NEARLY_ONE:
+                angle = acos(abs(cosine))
+                sine = sin(angle)
+                early = sin((1.0 - fraction) * angle) / sine
+                late = sin(fraction * angle) / (sine if cosine >= 0.0 else -sine)
+                ax, ay = early * ax + late * cx, early * ay + late * cy
+                az, aw = early * az + late * cz, early * aw + late * cw
         tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
         x, y, z = (
             px + x + aw * tx + ay * tz - az * ty,
@@ -87,33 +110,6 @@ def invert(pose: Pose) -> Pose:
     back = (-x, -y, -z, w)
     tx, ty, tz = rotate(back, pose.translation)
     return Pose((-tx, -ty, -tz), back)
-
-
-def interpolate(before: Pose, after: Pose, fraction: float) -> Pose:
-    """Interpolate between two poses, by the smaller of the two rotations.
-
-    Args:
-        before: Pose at fraction 0.
-        after: Pose at fraction 1.
-        fraction: Position between the two.
-    """
-    (ax, ay, az), (px, py, pz, pw) = before
-    (bx, by, bz), (qx, qy, qz, qw) = after
-    middle = (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)
-    cosine = px * qx + py * qy + pz * qz + pw * qw
-    if not -_NEARLY_ONE <= cosine <= _NEARLY_ONE:
-        return _new_pose(Pose, (middle, before.rotation))
-    angle = acos(abs(cosine))
-    sine = sin(angle)
-    early = sin((1.0 - fraction) * angle) / sine
-    late = sin(fraction * angle) / (sine if cosine >= 0.0 else -sine)
-    rotation = (
-        early * px + late * qx,
-        early * py + late * qy,
-        early * pz + late * qz,
-        early * pw + late * qw,
-    )
-    return _new_pose(Pose, (middle, rotation))
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
