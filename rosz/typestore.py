@@ -26,6 +26,7 @@ from rosz.idl import (
     Definition,
     Folders,
     action_of,
+    action_type,
     full_name,
     identity,
     is_service,
@@ -148,6 +149,22 @@ class TypeStore:
         """
         cls: type[Service] = self._from_text(self._check_name(name, "srv"), text, others)
         return cls
+
+    def action_from_text(self, name: str, text: str, others: Mapping[str, str]) -> type[Action]:
+        """Return an action class by the text of its definition; see `message_from_text`.
+
+        Args:
+            name: ``example_interfaces/Fibonacci`` or ``example_interfaces/action/Fibonacci``.
+            text: Text of the definition.
+            others: Texts of types in the definition by name.
+
+        Raises:
+            TypeNotFound: The name is not that of an action type.
+            DefinitionError: A definition is not well-formed, or a type in it does not exist.
+        """
+        full = self._check_name(name, "action")
+        texts = {full_name(other, "msg"): one for other, one in others.items()}
+        return _TextTypes(self, self._compiler, {full: text, **texts}).action(full)
 
     def names(self, kind: Kind, package: str | None = None) -> list[str]:
         """Return the names of all types of a kind, as ``std_msgs/String``, sorted.
@@ -451,7 +468,18 @@ class _TextTypes:
     def _find(self, name: str) -> Definition:
         if name in self._texts and name not in _BUILT_IN:
             return Definition(self._texts[name], f"<{name}>")
+        package, kind, base = name.split("/")
+        action = f"{package}/{kind}/{_file_of(kind, base)}"
+        if action != name and action in self._texts:
+            made = action_type(action, self._find(action), base)
+            if made is not None:
+                return made
         return self._store.definition(name)
+
+    def action(self, name: str) -> type[Action]:
+        """Return an action class."""
+        found: type[Action] = self._compile(name, self._all_texts(name))
+        return found
 
     def find(self, name: str) -> Any:
         """Return a message or service class; the store's own if its definition is the same."""
@@ -463,10 +491,14 @@ class _TextTypes:
             known = None
         if known is not None and (known._type_hash, known._md5sum) == wanted:
             return known
+        return self._compile(name, self._all_texts(name))
+
+    def _all_texts(self, name: str) -> dict[str, str]:
+        """Return the texts of a type and of all types in it, by name."""
         texts = {name: self._find(name).text}
         for part in self._catalog.parts(name):
             texts |= {one.name: one.text for one in self._catalog.below(part).values()}
-        return self._compile(name, texts)
+        return texts
 
     def _compile(self, name: str, texts: dict[str, str]) -> Any:
         package, kind, base = name.split("/")

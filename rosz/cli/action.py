@@ -100,7 +100,7 @@ def send_command(
     """
     seconds("--timeout", timeout)
     import rosz.message.convert  # noqa: F401  # used later; Ctrl-C must not interrupt an import
-    from rosz.introspect.actions import find_action, make_goal, wait_for_action
+    from rosz.introspect.actions import action_type, find_action, make_goal, wait_for_action
     from rosz.introspect.arguments import read_arguments
     from rosz.node import Node
     from rosz.node.goals import GoalState
@@ -111,16 +111,14 @@ def send_command(
         ready()
         name = call.resolve(action)
         if wait:
-            type_name = wait_for_action(context, name, timeout)
-        else:
-            type_name = find_action(context.graph.refresh(), name)
-        action_type = context.types.action(type_name)
-        with (
-            Node("rosz_action", anonymous=True, context=context) as node,
-            node.action_client(name, action_type) as client,
-        ):
-            goal = make_goal(client, arguments, time.time_ns())
-            state = _send(client, goal, timeout, feedback=feedback, as_json=json)
+            wait_for_action(context, name, timeout)
+        view = context.graph.refresh()
+        find_action(view, name)
+        with Node("rosz_action", anonymous=True, context=context) as node:
+            kind = action_type(node, view, name)
+            with node.action_client(name, kind) as client:
+                goal = make_goal(client, arguments, time.time_ns())
+                state = _send(client, goal, timeout, feedback=feedback, as_json=json)
     return int(state is not GoalState.SUCCEEDED)
 
 

@@ -18,6 +18,7 @@ __all__ = (
     "Definition",
     "Folders",
     "action_messages",
+    "action_type",
     "full_name",
     "read_definition",
     "split_definitions",
@@ -51,7 +52,7 @@ _ACTION_TYPES = {
 """Definitions of the types that ROS 2 makes of an action, besides its three parts."""
 
 
-def _action_type(action: str, definition: Definition, base: str) -> Definition | None:
+def action_type(action: str, definition: Definition, base: str) -> Definition | None:
     """Return the definition of a type that ROS 2 makes of an action; None if it makes none such.
 
     Args:
@@ -305,7 +306,7 @@ class Folders:
                 made = self._of_action(folder, base)
             elif kind == "action" and action_of(base) != base:
                 action = f"{package}/action/{action_of(base)}"
-                made = _action_type(action, self.find(action), base)
+                made = action_type(action, self.find(action), base)
             if made is not None:
                 return made
             known = [one.rpartition("/")[2] for one in self.names(package, kind)]

@@ -23,6 +23,7 @@ from rosz.idl.spec import ActionSpec, Field, FieldType, MessageSpec, ServiceSpec
 __all__ = (
     "action_hash",
     "describe",
+    "describe_field",
     "identity",
     "message_hash",
     "message_md5",
@@ -196,6 +197,32 @@ def describe(spec: MessageSpec) -> dict[str, Any]:
             for field in spec.fields or (_EMPTY,)
         ],
     }
+
+
+def describe_field(name: str, type_id: int, capacity: int, bound: int, nested: str) -> str:
+    """Return the line of a definition for a field of a description; empty for one that stands in.
+
+    Args:
+        name: Name of the field.
+        type_id: Number of its type (REP 2016).
+        capacity: Number of elements, or the largest number.
+        bound: Largest length of a bounded string.
+        nested: Full name of its type if that is a message.
+
+    Raises:
+        ValueError: There is no type of that number in definitions of ROS.
+    """
+    if (name, type_id) == (_EMPTY.name, _IDS[_EMPTY.type.base]):
+        return ""
+    shapes = {0: "", 48: f"[{capacity}]", 96: f"[<={capacity}]", 144: "[]"}
+    shape, base = divmod(type_id, 48)
+    bases = {_MESSAGE: nested.replace("/msg/", "/")} | {
+        number: text for text, number in _IDS.items() if text != "char"
+    }
+    bases |= {_IDS[text] + _BOUNDED: f"{text}<={bound}" for text in ("string", "wstring")}
+    if base not in bases or 48 * shape not in shapes:
+        raise ValueError(f"field '{name}' has a type of number {type_id}, which no definition has")
+    return f"{bases[base]}{shapes[48 * shape]} {name}\n"
 
 
 def _describe_type(kind: FieldType) -> dict[str, Any]:

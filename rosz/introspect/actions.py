@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.errors import NotFoundError, near_miss
-from rosz.node.goals import SEND
+from rosz.node.goals import FEEDBACK, RESULT, SEND
+from rosz.node.type_description import request_action
 from rosz.wire import Kind
 
 if TYPE_CHECKING:
     from rosz.graph import View
-    from rosz.node import Context
+    from rosz.message import Action
+    from rosz.node import Context, Node
     from rosz.node.action_client import ActionClient
     from rosz.wire import Token
 
 __all__ = (
     "ActionEntry",
+    "action_type",
     "describe_action",
     "find_action",
     "list_actions",
@@ -103,6 +106,28 @@ def wait_for_action(context: Context, name: str, timeout: float) -> str:
         lambda view: bool(view.servers(name + _SUFFIX)), timeout, f"server of action '{name}'"
     )
     return find_action(view, name)
+
+
+def action_type(node: Node, view: View, name: str) -> type[Action]:
+    """Return the class of an action that is served; its server describes one unknown here.
+
+    Args:
+        node: Node that requests the description.
+        view: What is known of the graph.
+        name: Full name of the action.
+
+    Raises:
+        NotFoundError: No node serves it, or the server cannot describe it.
+        WaitTimeout: The server did not respond in time.
+        ServiceError: The server ended before it responded.
+    """
+    type_name = find_action(view, name)
+    entities = [
+        *view.servers(f"{name}/{SEND}")[:1],
+        *view.servers(f"{name}/{RESULT}")[:1],
+        *view.publishers(f"{name}/{FEEDBACK}")[:1],
+    ]
+    return request_action(node, type_name, entities)
 
 
 def make_goal(client: ActionClient, values: Sequence[Any], now: int) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import msgspec
@@ -12,11 +13,13 @@ from rosz.idl import (
     Catalog,
     MessageSpec,
     describe,
+    describe_field,
     is_service,
     message_hash,
     service_hash,
     service_parts,
 )
+from rosz.message import Action
 from rosz.msgs.type_description_interfaces.msg import (
     Field,
     FieldType,
@@ -36,7 +39,13 @@ from rosz.session import clamp_timeout
 from rosz.typestore import TypeStore
 from rosz.wire import NO_HASH, Token
 
-__all__ = ("TypeDefinition", "describe_type", "request_definition", "request_type")
+__all__ = (
+    "TypeDefinition",
+    "describe_type",
+    "request_action",
+    "request_definition",
+    "request_type",
+)
 
 _SERVICE = "get_type_description"
 _TEXTS = frozenset({"msg", "srv"})
@@ -74,15 +83,7 @@ def request_definition(node: NodeCore, entity: Token, timeout: float = 10.0) -> 
         UsageError: The timeout is not a number.
     """
     name = entity.type_name
-    deadline = time.monotonic() + clamp_timeout(timeout)
-    version = "" if entity.type_hash == NO_HASH else entity.type_hash
-    service = f"{entity.node_name}/{_SERVICE}"
-    with node.keep(Client(node, service, GetTypeDescription, SERVICES, timeout)) as client:
-        client.wait_for_service(timeout)
-        left = deadline - time.monotonic()
-        response = client.call(GetTypeDescriptionRequest(name, version, True), left)
-    if not response.successful:
-        raise TypeNotFound(name, f"node '{entity.node_name}': {response.failure_reason}")
+    response = _request(node, entity, timeout, sources=True)
     texts = {
         source.type_name: source.raw_file_contents
         for source in response.type_sources
@@ -91,6 +92,24 @@ def request_definition(node: NodeCore, entity: Token, timeout: float = 10.0) -> 
     if name not in texts:
         raise TypeNotFound(name, f"node '{entity.node_name}' sent no text of its definition")
     return TypeDefinition(name, texts.pop(name), texts)
+
+
+def _request(
+    node: NodeCore, entity: Token, timeout: float, *, sources: bool
+) -> GetTypeDescriptionResponse:
+    """Request the description of an entity's type; errors as of `request_definition`."""
+    name = entity.type_name
+    deadline = time.monotonic() + clamp_timeout(timeout)
+    version = "" if entity.type_hash == NO_HASH else entity.type_hash
+    service = f"{entity.node_name}/{_SERVICE}"
+    with node.keep(Client(node, service, GetTypeDescription, SERVICES, timeout)) as client:
+        client.wait_for_service(timeout)
+        left = deadline - time.monotonic()
+        request = GetTypeDescriptionRequest(name, version, sources)
+        response: GetTypeDescriptionResponse = client.call(request, left)
+    if not response.successful:
+        raise TypeNotFound(name, f"node '{entity.node_name}': {response.failure_reason}")
+    return response
 
 
 def request_type(node: NodeCore, entity: Token, timeout: float = 10.0) -> type[Any]:
@@ -130,6 +149,70 @@ def request_type(node: NodeCore, entity: Token, timeout: float = 10.0) -> type[A
             f" '{made._type_hash}', expected '{entity.type_hash}'",
         )
     return made
+
+
+def request_action(
+    node: NodeCore, name: str, entities: Sequence[Token], timeout: float = 10.0
+) -> type[Action]:
+    """Return the class of an action, made of the other node's descriptions if need be.
+
+    The class that is known here is returned if its type hashes are those of the entities. Nodes
+    have no text of what ROS 2 makes of an action, but describe the fields.
+
+    Args:
+        node: The node that needs the class.
+        name: ``pkg/action/Name``.
+        entities: Tokens of the two services of the action and of its publisher of feedback.
+        timeout: Time limit in seconds for each of them.
+
+    Raises:
+        WaitTimeout: The other node did not serve or did not respond in time.
+        ServiceError: The other node ended before it responded.
+        TypeNotFound: The other node has no such type, or none that definitions can have.
+        ClosedError: The node is closed.
+        UsageError: The timeout is not a number.
+    """
+    types = node.context.types
+    try:
+        found = types.action(name)
+    except RoszError:
+        found = None
+    if found is not None and _has_types(found, entities):
+        return found
+    lines: dict[str, str] = {}
+    for entity in entities:
+        lines |= _request_lines(node, entity, timeout)
+    text = "---\n".join(lines.get(f"{name}_{part}", "") for part in ("Goal", "Result", "Feedback"))
+    others = {one: text for one, text in lines.items() if one.split("/")[1] == "msg"}
+    made = types.action_from_text(name, text, others)
+    if not _has_types(made, entities):
+        raise TypeNotFound(name, "what its server describes has another hash than the server uses")
+    return made
+
+
+def _has_types(action: type[Action], entities: Iterable[Token]) -> bool:
+    """Return whether the services and the feedback of an action have the hashes of entities."""
+    kinds = (action.SendGoal, action.GetResult, action.FeedbackMessage)
+    hashes = {kind._type_name: kind._type_hash for kind in kinds}
+    return all(one.type_hash in {NO_HASH, hashes[one.type_name]} for one in entities)
+
+
+def _request_lines(node: NodeCore, entity: Token, timeout: float) -> dict[str, str]:
+    """Return the definition of an entity's type, and of all types in it, by their names."""
+    found = _request(node, entity, timeout, sources=False).type_description
+    lines = {}
+    for one in (found.type_description, *found.referenced_type_descriptions):
+        fields = ((field.name, field.type) for field in one.fields)
+        try:
+            lines[one.type_name] = "".join(
+                describe_field(
+                    name, kind.type_id, kind.capacity, kind.string_capacity, kind.nested_type_name
+                )
+                for name, kind in fields
+            )
+        except ValueError as error:
+            raise TypeNotFound(one.type_name, str(error)) from error
+    return lines
 
 
 def describe_type(

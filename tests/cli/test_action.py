@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -108,3 +109,53 @@ def test_waiting_for_a_server(shell: Shell, network: Network) -> None:
     late.action_server("/late", Fibonacci, execute)
     program.wait_for("goal succeeded")
     assert program.exit_code() == 0
+
+
+DIG = """
+string<=5 word "deep"
+dig_msgs/Layer[] layers
+float64[2] place
+int8[<=3] few
+---
+---
+dig_msgs/Layer at
+builtin_interfaces/Time stamp
+"""
+
+DIGGER = """
+    import threading, rosz
+
+    with rosz.Node("digger") as node:
+        types = node.context.types
+        Dig, Layer = types.action("dig_msgs/Dig"), types.message("dig_msgs/Layer")
+
+        def execute(goal):
+            for layer in goal.request.layers:
+                goal.feedback(Dig.Feedback(at=layer))
+            print("got", goal.request.word, list(goal.request.place), flush=True)
+            goal.succeed()
+
+        node.action_server("/dig", Dig, execute)
+        print("ready", flush=True)
+        threading.Event().wait()
+"""
+
+
+def test_an_action_of_unknown_type_is_described_by_its_server(
+    shell: Shell, network: Network, tmp_path: Path
+) -> None:
+    package = tmp_path / "dig_msgs"
+    for folder, text in {"action/Dig.action": DIG, "msg/Layer.msg": "float32 depth\n"}.items():
+        (package / folder).parent.mkdir(parents=True)
+        (package / folder).write_text(text)
+    (package / "package.xml").write_text("<package><name>dig_msgs</name></package>")
+    program = network.program(DIGGER, ROSZ_PACKAGE_PATH=str(tmp_path))
+    program.wait_for("ready")
+    goal = "{word: sand, layers: [{depth: 0.5}], place: [1, 2], few: [7]}"
+    sent = shell("action", "send", "-f", "/dig", goal)
+    assert sent.code == 0
+    assert sent.lines[-1] == "goal succeeded"
+    assert "    depth: 0.5" in sent.lines
+    assert program.wait_for("got") == "got sand [1.0, 2.0]"
+    refused = shell("action", "send", "/dig", "{word: gravel}")
+    assert (refused.code, "word" in refused.err) == (1, True)

@@ -18,6 +18,7 @@ from network import TIMEOUT, Network
 
 from rosz.cli.complete import complete, expand, split_line
 from rosz.cli.env import ALIASES
+from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.workspace import create
@@ -118,6 +119,27 @@ def ask(shell: Shell, capsys: pytest.CaptureFixture[str]) -> Ask:
 )
 def test_candidates(system: Network, ask: Ask, line: str, expected: list[str]) -> None:
     del system
+    assert ask(line) == expected
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("rosz action ", ["info", "list", "send", "show", "type"]),
+        ("rosz action info /tur", ["/turtle1/turn"]),
+        ("rosz action type /tur", ["/turtle1/turn"]),
+        ("rosz action send /tur", ["/turtle1/turn"]),
+        ("rosz action send -f /tur", ["/turtle1/turn"]),
+        ("rosz action send --fe", ["--feedback"]),
+        ("rosz action send /turtle1/turn ", ["{order: 0}"]),
+        ("rosz action send /turtle1/turn {order:\\ 0} ", []),
+        ("rosz action send /turtle1/none ", []),
+        ("rosz action show example_interfaces/Fib", ["example_interfaces/Fibonacci"]),
+    ],
+)
+def test_candidates_of_actions(network: Network, ask: Ask, line: str, expected: list[str]) -> None:
+    server = network.node("server")
+    server.action_server("/turtle1/turn", Fibonacci, lambda goal: goal.succeed())
     assert ask(line) == expected
 
 
