@@ -18,7 +18,6 @@ from fastapi import FastAPI
 from nicegui import ui
 
 from rosz.errors import TransportError
-from rosz.lifecycle import Lifecycle
 from rosz.web.guard import Guard
 from rosz.web.model import Permission, System
 from rosz.web.pages import add_pages
@@ -32,7 +31,6 @@ __all__ = ("PageServer",)
 _START_SECONDS = 30.0
 _STOP_SECONDS = 1
 _LOGGERS = ("nicegui", "uvicorn.error")
-_log = logging.getLogger("rosz.web")
 
 
 class _Server(uvicorn.Server):
@@ -83,10 +81,7 @@ class PageServer:
     ) -> None:
         self._socket = _listen(host, port)
         self.port: int = self._socket.getsockname()[1]
-        self._lifecycle = Lifecycle("the page", log=_log)
-        self._system = System(node, permission)
-        self._lifecycle.keep(self._system)
-        add_pages(self._system)
+        add_pages(System(node, permission))
         app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         ui.run_with(
             app,
@@ -122,7 +117,6 @@ class PageServer:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         self._server.should_exit = True
         self._worker.close()
-        self._lifecycle.close()
         self._socket.close()
 
 

@@ -17,15 +17,17 @@ import math
 import rosz
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_msgs.msg import Float64, String
+from rosz.msgs.std_srvs.srv import SetBool
 
 with rosz.Node("robot") as node:
     chatter = node.publisher("chatter", String)
     wave = node.publisher("wave", Float64)
     node.subscription("cmd_vel", Twist, lambda got: print("drives", got.linear.x, flush=True))
-    node.log.warning("the battery is low")
+    node.service("enable", SetBool, lambda request: SetBool.Response(True, f"is {request.data}"))
     node.params.set("~rate", 20)
     node.params.set("~gains", {"p": 1.5, "names": ["a", "b"], "on": True})
-    node.params.watch("~rate", lambda change: print("rate is", change.after, flush=True))
+    node.params.watch("~rate", lambda change: print("rate is", change.new, flush=True))
+    node.timer(1.0, lambda event: node.log.warning("the battery is low"))
     print("ready", flush=True)
     for tick in node.rate(20):
         chatter.publish(String(data=f"hello {tick}"))

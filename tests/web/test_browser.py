@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -16,6 +18,23 @@ from .robot import ROBOT, THEMES, open_browser, set_screen, take_picture
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
 LONG = 4 * TIMEOUT
+_ATTEMPT = 3.0
+
+
+_CLICK = """
+const found = [...document.querySelectorAll('.q-btn, .q-tree__node-header-content span')]
+  .filter((one) => one.innerText.trim().endsWith(arguments[0]) && one.offsetParent !== null);
+if (found.length) found.at(-1).click();
+return found.length > 0;
+"""
+_FILL = """
+const field = document.querySelector(arguments[0]);
+if (!field) return false;
+Object.getOwnPropertyDescriptor(Object.getPrototypeOf(field), 'value').set.call(
+  field, arguments[1]);
+field.dispatchEvent(new Event('input', {bubbles: true}));
+return true;
+"""
 
 
 class World:
@@ -31,8 +50,13 @@ class World:
         self.address = found.group().rstrip("/")
 
     def open(self, path: str) -> None:
-        """Open a page."""
+        """Open a page, and wait until what one does there reaches the server."""
         self.browser.get(self.address + path)
+        eventually(
+            lambda: self.browser.execute_script("return window.did_handshake === true"),
+            f"{path} is connected",
+            LONG,
+        )
 
     @property
     def text(self) -> str:
@@ -43,6 +67,36 @@ class World:
         """Wait until texts are on the page."""
         for text in texts:
             eventually(lambda text=text: text in self.text, f"'{text}' on the page", LONG)  # type: ignore[misc]
+
+    def click(self, text: str) -> None:
+        """Click the innermost thing with a text, as soon as there is one."""
+        eventually(lambda: self.browser.execute_script(_CLICK, text), f"'{text}' to click", LONG)
+
+    def fill(self, selector: str, text: str) -> None:
+        """Write into a field in place of what is there."""
+        eventually(
+            lambda: self.browser.execute_script(_FILL, selector, text), f"a {selector}", LONG
+        )
+
+    def send(self, text: str, button: str, arrived: Callable[[], bool]) -> None:
+        """Fill in a form and send it, again if the page was not yet complete the first time."""
+
+        def attempt() -> bool:
+            self.fill("textarea", text)
+            self.click(button)
+            deadline = time.monotonic() + _ATTEMPT
+            while not arrived() and time.monotonic() < deadline:
+                threading.Event().wait(0.01)
+            return arrived()
+
+        eventually(attempt, f"what '{text}' does", LONG)
+
+    def should_hold(self, selector: str, text: str) -> None:
+        """Wait until a field holds a text."""
+        value = "return document.querySelector(arguments[0])?.value ?? ''"
+        eventually(
+            lambda: text in self.browser.execute_script(value, selector), f"{text} in a field", LONG
+        )
 
     def messages(self) -> list[str]:
         """Return what is on the console of the browser, and forget it."""
@@ -63,8 +117,14 @@ def world() -> Iterator[World]:
 
 
 SEEN = {
-    "/": ("/robot", "/chatter", "std_msgs/String", "Hz"),
+    "/": ("/chatter", "/robot", "std_msgs/String", "Hz"),
+    "/graph": ("/chatter", "/robot", "20 Hz"),
+    "/topics": ("data", "std_msgs/String", "hello"),
+    "/console": ("the battery is low", "/robot"),
+    "/parameters": ("gains", "rate", "1.5"),
+    "/services": ("/enable", "std_srvs/SetBool"),
 }
+QUERY = {"/graph": "?content=all", "/topics": "?topic=/chatter", "/services": "?service=/enable"}
 
 
 @pytest.mark.parametrize("path", [entry.path for entry in ENTRIES])
@@ -74,13 +134,45 @@ def test_every_page_opens_without_a_message(
     folder = tmp_path_factory.getbasetemp() / "artefacts"
     for screen, theme in THEMES:
         set_screen(world.browser, screen, theme)
-        world.open(path)
+        world.open(path + QUERY.get(path, ""))
         texts = SEEN[path]
         world.should_see(*(texts if screen == "laptop" else texts[:1]))
         take_picture(world.browser, folder, f"{path.strip('/') or 'overview'}-{screen}-{theme}")
         wide = "return document.documentElement.scrollWidth - window.innerWidth"
         assert world.browser.execute_script(wide) <= 0, f"{path} is wider than a {screen}"
         assert world.messages() == []
+
+
+def test_what_pages_do_arrives(world: World) -> None:
+    set_screen(world.browser, "laptop", "light")
+    world.open("/topics?topic=/cmd_vel")
+    world.should_hold("textarea", "angular:")
+    world.send("linear: {x: 1.5}", "Publish once", lambda: "drives 1.5" in world.robot.output)
+    world.send("linear: {x: much}", "Publish once", lambda: "linear.x" in world.text)
+    world.open("/services?service=/enable")
+    world.should_hold("textarea", "data: False")
+    world.send("data: true", "Call", lambda: "is True" in world.text)
+    world.open("/parameters")
+    world.should_see("rate")
+    world.click("rate")
+    world.should_see("Value (int)")
+    world.fill(".q-dialog textarea", "35")
+    world.click("Set")
+    world.robot.wait_for("rate is 35", LONG)
+    world.should_see("20 → 35")
+    assert world.messages() == []
+
+
+def test_the_graph_tells_of_what_is_clicked(world: World) -> None:
+    set_screen(world.browser, "laptop", "light")
+    world.open("/graph?content=all")
+    world.should_see("/chatter")
+    world.browser.execute_script(
+        "document.querySelector('[data-key=\"topic:/chatter\"]')"
+        ".dispatchEvent(new MouseEvent('click', {bubbles: true}))"
+    )
+    world.should_see("Type: std_msgs/String", "Publishers:")
+    assert world.messages() == []
 
 
 def test_a_closed_page_costs_nothing_and_ctrl_c_ends_at_once() -> None:

@@ -4,10 +4,28 @@ What costs something is open only while a page uses it (`Shared`). Queues are bo
 newest wins. Pages read what they show at their own pace, so that a slow browser holds nothing up.
 """
 
+from rosz.web.model.calling import call_service
+from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
+from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
+from rosz.web.model.sending import Sending, form_of
 from rosz.web.model.sharing import Shared
 from rosz.web.model.system import System
+from rosz.web.model.topic import TopicWatch, message_tree
 from rosz.web.model.traffic import Traffic
 
-__all__ = ("Findings", "Permission", "Shared", "System", "Traffic")
+__all__ = (
+    "Findings",
+    "LogBook",
+    "Parameters",
+    "Permission",
+    "Sending",
+    "Shared",
+    "System",
+    "TopicWatch",
+    "Traffic",
+    "call_service",
+    "form_of",
+    "message_tree",
+)

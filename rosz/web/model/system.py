@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from typing import TYPE_CHECKING
 
 from rosz.introspect.survey import Survey
+from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
+from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
 from rosz.web.model.sharing import Shared
 from rosz.web.model.traffic import Traffic
@@ -63,6 +63,8 @@ class System:
         graph: All nodes and entities.
         traffic: Rates and bandwidths of topics.
         findings: Findings of the doctor.
+        console: The log of all nodes.
+        parameters: The parameters of all nodes.
     """
 
     def __init__(self, node: Node, permission: Permission) -> None:
@@ -71,14 +73,11 @@ class System:
         self.graph: Shared[GraphWatch] = Shared(lambda: GraphWatch(node))
         self.traffic: Shared[Traffic] = Shared(lambda: Traffic(node))
         self.findings: Shared[Findings] = Shared(lambda: Findings(node.context.environment))
-        self.began: float = time.monotonic()
-        self._closing = threading.Event()
+        self.console: Shared[LogBook] = Shared(lambda: LogBook(node))
+        self.parameters: Shared[Parameters] = Shared(lambda: Parameters(node, permission))
 
     @property
     def observed(self) -> int:
         """Number of uses that pages have open."""
-        return self.graph.users + self.traffic.users + self.findings.users
-
-    def close(self) -> None:
-        """End what waits; a second call has no effect."""
-        self._closing.set()
+        shared = (self.graph, self.traffic, self.findings, self.console, self.parameters)
+        return sum(one.users for one in shared)

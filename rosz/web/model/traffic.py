@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from rosz.introspect.measure import BandwidthMeter
+from rosz.introspect.measure import BandwidthMeter, BandwidthStats
 from rosz.introspect.subscribe import subscribe_samples
 from rosz.names import is_of_action, short_type
 from rosz.wire import Kind
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosz.node import Entity, Node
     from rosz.wire import Token
 
-__all__ = ("Flow", "Traffic")
+__all__ = ("Flow", "Traffic", "flow_of")
 
 _HEAVY = frozenset(
     {
@@ -47,6 +47,14 @@ class Flow(msgspec.Struct, frozen=True):
     size: float
 
 
+def flow_of(stats: BandwidthStats | None) -> Flow | None:
+    """Return what flows by what a meter says; None if too little has come."""
+    if stats is None:
+        return None
+    rate = stats.bytes_per_second / stats.mean if stats.mean else 0.0
+    return Flow(rate, stats.bytes_per_second, stats.mean)
+
+
 class _Tap:
     """The subscription of one topic, and its meter."""
 
@@ -61,11 +69,7 @@ class _Tap:
         )
 
     def flow(self) -> Flow | None:
-        stats = self._meter.stats(time.monotonic_ns())
-        if stats is None:
-            return None
-        rate = stats.bytes_per_second / stats.mean if stats.mean else 0.0
-        return Flow(rate, stats.bytes_per_second, stats.mean)
+        return flow_of(self._meter.stats(time.monotonic_ns()))
 
     def close(self) -> None:
         self._entity.close()

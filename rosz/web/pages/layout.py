@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar
@@ -12,7 +13,17 @@ from rosz.errors import RoszError
 from rosz.lifecycle import Closable
 from rosz.web.model import Shared, System
 
-__all__ = ("ENTRIES", "Entry", "Frame", "bandwidth_text", "empty_state", "rate_text", "size_text")
+__all__ = (
+    "ENTRIES",
+    "Entry",
+    "Frame",
+    "address_of",
+    "bandwidth_text",
+    "empty_state",
+    "rate_text",
+    "short_rate_text",
+    "size_text",
+)
 
 T = TypeVar("T", bound=Closable)
 R = TypeVar("R")
@@ -38,7 +49,15 @@ class Entry(NamedTuple):
     icon: str
 
 
-ENTRIES = (Entry("/", "Overview", "space_dashboard"),)
+ENTRIES = (
+    Entry("/", "Overview", "space_dashboard"),
+    Entry("/graph", "Graph", "hub"),
+    Entry("/topics", "Topics", "swap_horiz"),
+    Entry("/console", "Console", "subject"),
+    Entry("/parameters", "Parameters", "tune"),
+    Entry("/services", "Services", "build"),
+)
+"""The pages, in the order of the navigation."""
 
 _STYLE = """
 :root { --rosz-line: #d9dee7; --rosz-soft: #5b6577; --rosz-card: #ffffff; }
@@ -53,11 +72,24 @@ body.body--dark { background: #12151c; --rosz-line: #2c3340; --rosz-soft: #9aa5b
 .rosz-number { font-variant-numeric: tabular-nums; }
 .q-table th { color: var(--rosz-soft); font-weight: 600; }
 .rosz-nav.q-item { border-radius: 8px; margin: 2px 8px; min-height: 40px; }
+.rosz-nav { color: inherit; }
+body.body--dark .q-btn.text-primary, body.body--dark .q-icon.text-primary {
+  color: #9dbcff !important; }
 .rosz-nav.rosz-here { background: #2456c81c; color: #2456c8; font-weight: 600; }
 body.body--dark .rosz-nav.rosz-here { background: #6b9bff26; color: #9dbcff; }
 a { color: #2456c8; } body.body--dark a { color: #9dbcff; }
 :focus-visible { outline: 2px solid #6b9bff; outline-offset: 1px; }
 .q-table__card { background: transparent; box-shadow: none; }
+.q-table__card.rosz-card { background: var(--rosz-card); }
+.rosz-value { color: #1f6f4a; } body.body--dark .rosz-value { color: #7fd1a6; }
+.rosz-level-DEBUG { background: #6b7689; } .rosz-level-INFO { background: #2b6cb0; }
+.rosz-level-WARN { background: #a86a10; } .rosz-level-ERROR { background: #c8342b; }
+.rosz-level-FATAL { background: #7b1fa2; }
+.rosz-graph { --graph-back: var(--rosz-card); --graph-soft: var(--rosz-soft); width: max-content; }
+body.body--dark .rosz-graph { --graph-text: #e6eaf2; --graph-node: #22345c;
+  --graph-node-line: #6b9bff; --graph-topic: #33301f; --graph-topic-line: #b59c55;
+  --graph-line: #75819a; }
+@media (min-width: 600px) { .rosz-narrow { display: none !important; } }
 @media (max-width: 599px) { .rosz-wide { display: none !important; } }
 """
 
@@ -99,7 +131,7 @@ class Frame:
             ui.left_drawer(value=False, bordered=True)
             .props("width=216 breakpoint=900 show-if-above")
             .classes("p-0 pt-3") as drawer,
-            ui.element("nav").props('aria-label="Pages"'),
+            ui.element("nav").props('aria-label="Pages"').classes("w-full"),
         ):
             for entry in ENTRIES:
                 with (
@@ -176,14 +208,18 @@ class Frame:
 
     def every(self, seconds: float, refresh: Callable[[], None]) -> None:
         """Call a function now and after each period while the page is open; errors are shown."""
+        faults: list[str] = []
 
         def guarded() -> None:
             try:
                 refresh()
             except RoszError as error:
-                self.show_fault(str(error))
+                faults[:] = [str(error)]
+                self.show_fault(faults[0])
             else:
-                self.show_fault("")
+                if faults:
+                    faults.clear()
+                    self.show_fault("")
 
         guarded()
         ui.timer(seconds, guarded, immediate=False)
@@ -226,6 +262,16 @@ def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.colum
         if command:
             ui.label(command).classes("rosz-mono rosz-card px-3 py-1")
     return column
+
+
+def address_of(path: str) -> None:
+    """Show the address that the page has now, so that it can be kept and sent."""
+    ui.run_javascript(f"history.replaceState(null, '', {json.dumps(path)})")
+
+
+def short_rate_text(rate: float) -> str:
+    """Return a rate in hertz in two digits, which change less often."""
+    return f"{float(f'{rate:.2g}'):g} Hz"
 
 
 def rate_text(rate: float) -> str:

@@ -18,6 +18,7 @@ __all__ = ("show_overview",)
 
 _PERIOD = 1.0
 _ROWS = 15
+_LINK_CELL = """<q-td :props="props"><a :href="props.row.address">{{ props.value }}</a></q-td>"""
 _HOUR, _MINUTE = 3600, 60
 
 
@@ -162,6 +163,7 @@ class _Tables:
                 .classes("w-full")
                 .props("flat dense")
             )
+            self.topics.add_slot("body-cell-name", _LINK_CELL)
             search.on_value_change(
                 lambda change: setattr(self.topics, "filter", change.value or "")
             )

@@ -1,0 +1,96 @@
+"""The log of all nodes while a page shows it, bounded in lines and bytes."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from rosz.errors import DecodeError
+from rosz.introspect.rosout import LogFilter, LogLine, read_line
+from rosz.introspect.subscribe import subscribe_samples
+from rosz.msgs.rcl_interfaces.msg import Log
+
+if TYPE_CHECKING:
+    from rosz.node import Node
+    from rosz.session import Sample
+
+__all__ = ("LogBook",)
+
+_MOST_LINES = 10_000
+_MOST_BYTES = 8 << 20
+_log = logging.getLogger("rosz.web")
+
+
+class LogBook:
+    """The newest lines of the log, until it is closed.
+
+    Args:
+        node: The node that subscribes to ``/rosout``.
+
+    Attributes:
+        received: Number of lines that have come.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.received: int = 0
+        self._lock = threading.Lock()
+        self._samples: deque[tuple[int, bytes]] = deque()
+        self._bytes = 0
+        self._entity = subscribe_samples(
+            node, "/rosout", Log._type_name, Log._type_hash, self._receive
+        )
+
+    def _receive(self, sample: Sample) -> None:
+        payload = sample.payload
+        with self._lock:
+            self.received += 1
+            self._samples.append((self.received, payload))
+            self._bytes += len(payload)
+            while len(self._samples) > _MOST_LINES or self._bytes > _MOST_BYTES:
+                self._bytes -= len(self._samples.popleft()[1])
+
+    def clear(self) -> None:
+        """Forget all lines."""
+        with self._lock:
+            self._samples.clear()
+            self._bytes = 0
+
+    def newest(
+        self, wanted: LogFilter, nodes: list[str], most: int, until: int | None = None
+    ) -> list[tuple[int, LogLine]]:
+        """Return the newest lines that pass a filter, each with its number, the newest first.
+
+        Args:
+            wanted: The filter.
+            nodes: Full names of the known nodes.
+            most: Largest number of lines.
+            until: Number of the newest line to return; the last one when not given.
+        """
+        with self._lock:
+            samples = list(self._samples)
+        found: list[tuple[int, LogLine]] = []
+        for number, line in _lines(samples, nodes, until):
+            if wanted.accepts(line):
+                found.append((number, line))
+                if len(found) >= most:
+                    break
+        return found
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._entity.close()
+
+
+def _lines(
+    samples: list[tuple[int, bytes]], nodes: list[str], until: int | None
+) -> Iterator[tuple[int, LogLine]]:
+    for number, payload in reversed(samples):
+        if until is not None and number > until:
+            continue
+        try:
+            yield number, read_line(Log.from_cdr(payload), nodes)
+        except DecodeError as error:
+            _log.debug("a message on /rosout is not a log message: %s", error)

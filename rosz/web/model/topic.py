@@ -1,0 +1,133 @@
+"""One topic while a page shows it: its newest message, and what flows."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rosz.introspect.measure import BandwidthMeter, DelayMeter, DelayStats, read_stamp
+from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.message import Message
+from rosz.time import DurationValue, TimeValue
+from rosz.web.model.traffic import Flow, flow_of
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+    from rosz.node import Node
+
+__all__ = ("TopicWatch", "message_tree")
+
+_QUEUE = 3
+_MOST_ELEMENTS = 30
+_LONGEST_TEXT = 200
+_FEW_BYTES = 16
+
+
+class TopicWatch:
+    """Keeps the newest message of a topic, as bytes until somebody looks.
+
+    Args:
+        node: The node that subscribes to it.
+        survey: The running nodes.
+        topic: Full name of the topic.
+
+    Attributes:
+        topic: Full name of the topic.
+        type_name: Its type, ``pkg/msg/Name``.
+        received: Number of messages that have come.
+
+    Raises:
+        NotFoundError: There is no such topic.
+        TypeNotFound: Its type is not known here.
+        DefinitionError: Its definition differs from the one here.
+    """
+
+    def __init__(self, node: Node, survey: Survey, topic: str) -> None:
+        types = topic_types(survey.view).get(topic, ("",))
+        token = find_token(survey.view, topic, types[0])
+        self.topic: str = topic
+        self.type_name: str = token.type_name
+        self.received: int = 0
+        self._now = node.now
+        self._payload: bytes | None = None
+        self._message: tuple[bytes, Any] | None = None
+        self._sizes = BandwidthMeter()
+        self._ages = DelayMeter(window=100)
+        self._delay: DelayStats | None = None
+        cls = find_class(node.context, token)
+        self._stamped: bool = cls._has_header
+        self._decode = node.context.decoder(cls)
+        self._subscription = node.subscription(
+            topic, cls, self._receive, queue_size=_QUEUE, raw=True
+        )
+
+    def _receive(self, payload: bytes) -> None:
+        self.received += 1
+        self._sizes.add(len(payload), time.monotonic_ns())
+        if self._stamped:
+            self._ages.add(read_stamp(payload, self.type_name), self._now())
+        self._payload = payload
+
+    def message(self) -> Any:
+        """Return the newest message; None before the first one.
+
+        Raises:
+            DecodeError: The bytes are not of its type.
+        """
+        payload = self._payload
+        if payload is None:
+            return None
+        known = self._message
+        if known is None or known[0] is not payload:
+            known = self._message = payload, self._decode(payload)
+        return known[1]
+
+    def flow(self) -> Flow | None:
+        """Return rate and bandwidth; None before the second message."""
+        return flow_of(self._sizes.stats(time.monotonic_ns()))
+
+    def delay(self) -> DelayStats | None:
+        """Return the age of messages when they arrive; None if they have no header."""
+        self._delay = self._ages.stats() or self._delay
+        return self._delay
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._subscription.close()
+
+
+def message_tree(value: Any, name: str, path: str = "") -> dict[str, Any]:
+    """Return a message, or a value in it, as a tree of dictionaries for a page.
+
+    Each has ``id``, a path that stays the same, ``name``, ``value`` as text, and ``children``.
+    Long sequences are cut, with a note of what is left out.
+    """
+    here = f"{path}/{name}"
+    if isinstance(value, Message) and not isinstance(value, TimeValue | DurationValue):
+        children = [message_tree(getattr(value, one), one, here) for one in value.__slots__]
+        return {"id": here, "name": name, "value": "", "children": children}
+    if isinstance(value, str | bytes | bool | int | float | TimeValue | DurationValue):
+        return {"id": here, "name": name, "value": _scalar_text(value)}
+    if isinstance(value, msgspec.Struct) or not hasattr(value, "__len__"):
+        return {"id": here, "name": name, "value": str(value)}
+    first = [
+        message_tree(one, f"[{number}]", here) for number, one in enumerate(value[:_MOST_ELEMENTS])
+    ]
+    if len(value) > _MOST_ELEMENTS:
+        rest = len(value) - _MOST_ELEMENTS
+        first.append({"id": f"{here}/more", "name": "…", "value": f"and {rest} more"})
+    return {"id": here, "name": name, "value": f"{len(value)} elements", "children": first}
+
+
+def _scalar_text(value: Any) -> str:
+    if isinstance(value, bytes):
+        more = "…" if len(value) > _FEW_BYTES else ""
+        return f"{len(value)} bytes: {value[:_FEW_BYTES].hex(' ')}{more}"
+    if isinstance(value, str):
+        text = value if len(value) <= _LONGEST_TEXT else value[:_LONGEST_TEXT] + "…"
+        return f'"{text}"'
+    if isinstance(value, TimeValue | DurationValue):
+        return f"{value.to_sec():.9f}"
+    return repr(value)

@@ -1,0 +1,221 @@
+"""The log of all nodes, as rqt_console shows it, and the levels of loggers."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from nicegui import ui
+
+from rosz.errors import UsageError
+from rosz.introspect.nodes import find_nodes, get_levels, set_level
+from rosz.introspect.rosout import LogFilter, LogLine, format_line
+from rosz.web.model import System
+from rosz.web.pages.layout import Frame, empty_state
+
+__all__ = ("show_console",)
+
+_PERIOD = 0.5
+_MOST = 300
+_MOST_SAVED = 10_000
+_LEVELS = ["DEBUG", "INFO", "WARN", "ERROR", "FATAL"]
+_LEVEL_CELL = """<q-td :props="props"><q-badge :class="'rosz-level-' + props.value"
+:label="props.value" /></q-td>"""
+_TEXT_CELL = """<q-td :props="props" style="white-space: pre-wrap; word-break: break-word">
+{{ props.value }}<div class="rosz-soft rosz-narrow" style="font-size: .75rem">
+{{ props.row.node }} {{ props.row.time }}</div></q-td>"""
+
+
+def show_console(system: System, node: str, level: str, pattern: str) -> None:
+    """Build the page.
+
+    Args:
+        system: The system.
+        node: Node or namespace whose lines are shown; empty for all.
+        level: The lowest level.
+        pattern: Pattern in the text.
+    """
+    _Console(system, node, level if level in _LEVELS else "DEBUG", pattern)
+
+
+class _Console:
+    """The table of lines with its filter."""
+
+    def __init__(self, system: System, node: str, level: str, pattern: str) -> None:
+        self._system = system
+        self._frame = frame = Frame(system, "Console", "/console")
+        self._graph, self._book = frame.use(system.graph), frame.use(system.console)
+        self._wanted = self._make_filter(node, level, pattern)
+        self._until: int | None = None
+        self._shown: object = None
+        with frame.content:
+            self._add_filter(node, level, pattern)
+            self._table = self._add_table()
+            self._empty = empty_state(
+                "subject",
+                "No line yet",
+                "Lines appear as nodes log them. A node that logs:",
+                "rosz launch launch/pub_and_sub.launch",
+            )
+        frame.every(_PERIOD, self._refresh)
+
+    def _add_filter(self, node: str, level: str, pattern: str) -> None:
+        with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+            self._level = (
+                ui.select(_LEVELS, value=level, label="Lowest level", on_change=self._filter)
+                .props("dense options-dense")
+                .classes("w-28")
+            )
+            self._node = (
+                ui.input("Node", value=node, on_change=self._filter)
+                .props("dense clearable debounce=300")
+                .classes("w-40")
+            )
+            self._pattern = (
+                ui.input("Text", value=pattern, on_change=self._filter)
+                .props("dense clearable debounce=300")
+                .classes("w-48")
+            )
+            ui.space()
+            self._pause = ui.button("Pause", icon="pause", on_click=self._toggle).props(
+                "flat dense no-caps"
+            )
+            ui.button("Clear", icon="delete_sweep", on_click=self._clear).props(
+                "flat dense no-caps"
+            )
+            ui.button("Save", icon="download", on_click=self._save).props("flat dense no-caps")
+            ui.button("Levels", icon="tune", on_click=self._show_levels).props("flat dense no-caps")
+
+    def _add_table(self) -> ui.table:
+        def column(name: str, label: str, classes: str = "") -> dict[str, Any]:
+            return {
+                "name": name,
+                "label": label,
+                "field": name,
+                "align": "left",
+                "classes": classes,
+                "headerClasses": classes.replace("rosz-soft", ""),
+            }
+
+        table = (
+            ui.table(
+                rows=[],
+                columns=[
+                    column("level", "Level"),
+                    column("text", "Message"),
+                    column("node", "Node", "rosz-wide"),
+                    column("time", "Time", "rosz-wide rosz-number"),
+                    column("place", "Place", "rosz-wide rosz-soft"),
+                ],
+                row_key="id",
+            )
+            .classes("rosz-card w-full")
+            .props('flat dense virtual-scroll :rows-per-page-options="[0]"')
+        )
+        table.style("max-height: calc(100vh - 160px)")
+        table.add_slot("body-cell-level", _LEVEL_CELL)
+        table.add_slot("body-cell-text", _TEXT_CELL)
+        return table
+
+    def _filter(self) -> None:
+        self._wanted = self._make_filter(
+            self._node.value or "", self._level.value, self._pattern.value or ""
+        )
+        self._shown = None
+        self._refresh()
+
+    def _make_filter(self, node: str, level: str, pattern: str) -> LogFilter:
+        """Return a filter; one without the pattern if that is not a regular expression."""
+        name = node.strip()
+        nodes = (name if name.startswith("/") else f"/{name}",) if name else ()
+        try:
+            found = LogFilter(nodes, level, pattern)
+        except UsageError as error:
+            self._frame.show_fault(str(error))
+            return LogFilter(nodes, level)
+        self._frame.show_fault("")
+        return found
+
+    def _toggle(self) -> None:
+        self._until = self._book.received if self._until is None else None
+        paused = self._until is not None
+        self._pause.props(f"icon={'play_arrow' if paused else 'pause'}")
+        self._pause.set_text("Go on" if paused else "Pause")
+
+    def _clear(self) -> None:
+        self._book.clear()
+        self._shown = None
+
+    def _newest(self, most: int) -> list[tuple[int, LogLine]]:
+        nodes = self._graph.survey().view.nodes()
+        return self._book.newest(self._wanted, nodes, most, self._until)
+
+    def _refresh(self) -> None:
+        state = (self._until or self._book.received, self._wanted)
+        if state == self._shown:
+            return
+        self._shown = state
+        rows = [
+            {
+                "id": number,
+                "level": line.level,
+                "text": line.text,
+                "node": line.node,
+                "time": time.strftime("%H:%M:%S", time.localtime(line.stamp))
+                + f".{line.stamp % 1 * 1000:03.0f}"[:4],
+                "place": f"{line.file.rpartition('/')[2]}:{line.line}",
+            }
+            for number, line in self._newest(_MOST)
+        ]
+        self._table.rows = rows
+        self._table.set_visibility(bool(rows))
+        self._empty.set_visibility(not rows)
+
+    def _save(self) -> None:
+        lines = [format_line(line) for _, line in reversed(self._newest(_MOST_SAVED))]
+        ui.download.content("\n".join([*lines, ""]), "console.txt")
+
+    def _show_levels(self) -> None:
+        nodes = sorted(
+            {
+                one.node
+                for one in self._graph.survey().processes.values()
+                if one.node != self._system.node.name
+            }
+        )
+        with ui.dialog(value=True), ui.card().classes("rosz-card w-96"):
+            ui.label("Levels of loggers").classes("text-base font-semibold")
+            if not nodes:
+                ui.label("No node of rosz runs here; nodes of ROS 2 have their own tools.")
+                return
+            select = ui.select(nodes, label="Node", value=None).classes("w-full").props("dense")
+            box = ui.column().classes("w-full gap-1")
+
+        async def load() -> None:
+            name = str(select.value)
+            levels = await self._frame.attempt(lambda: self._levels(name))
+            box.clear()
+            with box:
+                for logger, level in (levels or {}).items():
+                    ui.select(
+                        _LEVELS,
+                        label=logger,
+                        value=level if level in _LEVELS else None,
+                        on_change=lambda change, logger=logger: self._set_level(
+                            name, logger, change.value
+                        ),
+                    ).classes("w-full").props("dense options-dense")
+
+        select.on_value_change(load)
+
+    def _levels(self, name: str) -> dict[str, str]:
+        (node, *_) = find_nodes(self._graph.survey(), name)
+        return get_levels(self._system.node.context.session, node)
+
+    async def _set_level(self, name: str, logger: str, level: str) -> None:
+        def act() -> None:
+            self._system.permission.check_control(name)
+            for node in find_nodes(self._graph.survey(), name):
+                set_level(self._system.node.context.session, node, logger, level)
+
+        await self._frame.attempt(act, f"{logger} of {name} is {level}")

@@ -1,0 +1,216 @@
+"""The picture of nodes and topics, as rqt_graph shows it."""
+
+from __future__ import annotations
+
+from typing import get_args
+from urllib.parse import urlencode
+
+import msgspec
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from rosz.diagram import Content, Picture, PictureOptions, make_picture, write_dot, write_svg
+from rosz.errors import RoszError
+from rosz.introspect.nodes import find_nodes, format_node
+from rosz.introspect.survey import Survey
+from rosz.introspect.topics import format_topic
+from rosz.web.model import System, Traffic
+from rosz.web.pages.layout import Frame, address_of, empty_state, short_rate_text
+
+__all__ = ("show_graph",)
+
+_PERIOD = 1.0
+_CONTENTS = {"nodes": "Nodes only", "active": "Nodes and topics", "all": "All topics"}
+_SWITCHES = {
+    "hide_debug": "Hide /rosout, /clock and tools",
+    "hide_tf": "Hide /tf",
+    "hide_parameters": "Hide topics of parameters",
+    "hide_dead_sinks": "Hide topics without publishers",
+    "hide_leaves": "Hide topics without subscribers",
+    "hide_unconnected": "Hide nodes without topics",
+}
+_PICK = """(event) => {
+  const box = event.target.closest('[data-key]');
+  if (box && (event.type === 'click' || event.key === 'Enter')) emit(box.dataset.key);
+}"""
+
+
+def show_graph(system: System, content: str, nodes: str, topics: str, group: int) -> None:
+    """Build the page.
+
+    Args:
+        system: The system.
+        content: ``nodes``, ``active`` or ``all``.
+        nodes: Patterns of nodes.
+        topics: Patterns of topics.
+        group: Depth of the namespaces that get a frame.
+    """
+    shown: Content = "nodes"
+    for one in get_args(Content):
+        if one == content:
+            shown = one
+    options = PictureOptions(content=shown, nodes=nodes, topics=topics, group=max(0, group))
+    _Graph(system, options)
+
+
+class _Graph:
+    """The picture with its choices.
+
+    Args:
+        system: The system.
+        options: What is shown at first.
+    """
+
+    def __init__(self, system: System, options: PictureOptions) -> None:
+        self._options = options
+        self._frame = frame = Frame(system, "Graph", "/graph")
+        self._system = system
+        self._watch = frame.use(system.graph)
+        self._traffic: Traffic = frame.use(system.traffic)
+        self._shown: object = None
+        self._picture = Picture()
+        self._chosen = ""
+        self._zoom = 100
+        self._rates = True
+        with frame.content:
+            self._add_choices()
+            self._empty = empty_state(
+                "hub",
+                "Nothing to draw",
+                "No node matches, or none runs. Start a node:",
+                "rosz run turtlesim turtlesim_node",
+            )
+            with (
+                ui.element("div")
+                .classes("rosz-card w-full overflow-auto p-2")
+                .style("max-height: calc(100vh - 150px); min-height: 200px") as self._card
+            ):
+                self._drawing = ui.html("", sanitize=False).classes("rosz-graph")
+                for kind in ("click", "keydown"):
+                    self._drawing.on(kind, self._pick, js_handler=_PICK)
+        frame.every(_PERIOD, self._refresh)
+
+    def _add_choices(self) -> None:
+        options = self._options
+        with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+            ui.select(
+                _CONTENTS,
+                value=options.content,
+                label="Show",
+                on_change=lambda change: self._choose(content=change.value),
+            ).props("dense options-dense").classes("w-40")
+            for field, label in (("nodes", "Nodes"), ("topics", "Topics")):
+                ui.input(
+                    label,
+                    value=getattr(options, field),
+                    placeholder="/arm/*, -/arm/camera",
+                    on_change=lambda change, field=field: self._choose(
+                        **{field: change.value or ""}
+                    ),
+                ).props("dense clearable debounce=400").classes("w-44")
+            self._add_options()
+            ui.space()
+            ui.button(icon="remove", on_click=lambda: self._scale(-20)).props(
+                'flat dense round aria-label="Smaller"'
+            )
+            ui.button(icon="add", on_click=lambda: self._scale(20)).props(
+                'flat dense round aria-label="Larger"'
+            )
+            ui.button(
+                "SVG",
+                icon="download",
+                on_click=lambda: ui.download.content(write_svg(self._picture), "graph.svg"),
+            ).props("flat dense no-caps")
+            ui.button(
+                "DOT",
+                icon="download",
+                on_click=lambda: ui.download.content(write_dot(self._picture), "graph.dot"),
+            ).props("flat dense no-caps")
+
+    def _add_options(self) -> None:
+        options = self._options
+        with (
+            ui.button("Options", icon="tune").props("flat dense no-caps"),
+            ui.menu(),
+            ui.column().classes("p-3 gap-1"),
+        ):
+            for field, label in _SWITCHES.items():
+                ui.switch(
+                    label,
+                    value=getattr(options, field),
+                    on_change=lambda change, field=field: self._choose(**{field: change.value}),
+                ).props("dense")
+            ui.switch("Rates on the arrows", value=True, on_change=self._choose_rates).props(
+                "dense"
+            )
+            ui.number(
+                "Frames around namespaces",
+                value=options.group,
+                min=0,
+                max=9,
+                precision=0,
+                on_change=lambda change: self._choose(group=int(change.value or 0)),
+            ).props("dense").classes("w-full")
+
+    def _choose(self, **changes: object) -> None:
+        self._options = msgspec.structs.replace(self._options, **changes)
+        options = self._options
+        query = {
+            name: str(getattr(options, name))
+            for name in ("content", "nodes", "topics", "group")
+            if getattr(options, name) != getattr(PictureOptions(), name)
+        }
+        address_of("/graph?" + urlencode(query, safe="/*,") if query else "/graph")
+        self._refresh()
+
+    def _choose_rates(self, change: object) -> None:
+        self._rates = bool(getattr(change, "value", True))
+        self._refresh()
+
+    def _scale(self, step: int) -> None:
+        self._zoom = min(300, max(40, self._zoom + step))
+        self._drawing.style(f"zoom: {self._zoom / 100}")
+
+    def _refresh(self) -> None:
+        survey = self._watch.survey()
+        self._traffic.update(survey)
+        tokens = [t for t in survey.view.tokens if t.node_name != self._system.node.name]
+        self._picture = make_picture(tokens, self._options)
+        shown = (self._picture, self._flows() if self._rates else {}, self._chosen)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        drawn = bool(self._picture.boxes)
+        self._empty.set_visibility(not drawn and self._watch.complete)
+        self._card.set_visibility(drawn)
+        self._drawing.set_content(write_svg(*shown) if drawn else "")
+
+    def _flows(self) -> dict[str, str]:
+        found = {}
+        for topic in {topic for arrow in self._picture.arrows for topic in arrow.topics}:
+            flow = self._traffic.flow(topic)
+            if flow is not None:
+                found[topic] = short_rate_text(flow.rate)
+        return found
+
+    def _pick(self, event: GenericEventArguments) -> None:
+        kind, _, name = str(event.args).partition(":")
+        self._chosen = str(event.args)
+        try:
+            text = _describe(self._watch.survey(), kind, name)
+        except RoszError as error:
+            text = str(error)
+        with ui.dialog(value=True) as dialog, ui.card().classes("rosz-card max-w-3xl"):
+            ui.label(name).classes("text-base font-semibold")
+            ui.label(text).classes("rosz-mono whitespace-pre-wrap break-all")
+            with ui.row().classes("w-full justify-end"):
+                if kind == "topic":
+                    ui.link("Open the topic", f"/topics?{urlencode({'topic': name}, safe='/')}")
+                ui.button("Close", on_click=dialog.close).props("flat no-caps")
+        self._refresh()
+
+
+def _describe(survey: Survey, kind: str, name: str) -> str:
+    if kind == "topic":
+        return format_topic(survey, name).strip()
+    return "\n".join(format_node(survey, node).strip("-\n ") for node in find_nodes(survey, name))

@@ -1,0 +1,153 @@
+"""All services, and a form that calls one."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from rosz.errors import RoszError
+from rosz.introspect.services import list_services
+from rosz.web.model import System, call_service, form_of
+from rosz.web.pages.layout import Frame, address_of, empty_state
+
+__all__ = ("show_services",)
+
+_PERIOD = 1.0
+_HIDDEN = ("/get_loggers", "/set_logger_level")
+
+
+def show_services(system: System, service: str) -> None:
+    """Build the page.
+
+    Args:
+        system: The system.
+        service: Service to call; empty for none.
+    """
+    _Services(system, service)
+
+
+class _Services:
+    """The list of services, and the form."""
+
+    def __init__(self, system: System, service: str) -> None:
+        self._system = system
+        self._frame = frame = Frame(system, "Services", "/services")
+        self._graph = frame.use(system.graph)
+        self._types: dict[str, str] = {}
+        self._wanted = service
+        with frame.content:
+            self._empty = empty_state(
+                "build",
+                "No service",
+                "Nodes that offer services appear here, such as:",
+                "rosz run rosz_tutorials add_two_ints_server",
+            )
+            with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
+                with ui.column().classes("rosz-card p-4 gap-2 min-w-0") as self._card:
+                    with ui.row().classes("w-full items-center"):
+                        ui.label("Services").classes("text-base font-semibold")
+                        ui.space()
+                        search = (
+                            ui.input(placeholder="Filter").props("dense clearable").classes("w-40")
+                        )
+                    self._table = self._add_table(search)
+                    self._all = ui.switch("Services of loggers too", on_change=self._refresh).props(
+                        "dense"
+                    )
+                self._add_form()
+        frame.every(_PERIOD, self._refresh)
+
+    def _add_table(self, search: ui.input) -> ui.table:
+        def column(name: str, label: str, classes: str = "") -> dict[str, Any]:
+            return {
+                "name": name,
+                "label": label,
+                "field": name,
+                "align": "left",
+                "sortable": True,
+                "classes": classes,
+            }
+
+        table = (
+            ui.table(
+                rows=[],
+                columns=[
+                    column("name", "Service"),
+                    column("type", "Type", "rosz-soft"),
+                    column("nodes", "Node", "rosz-wide"),
+                ],
+                row_key="name",
+                pagination=12,
+            )
+            .classes("w-full cursor-pointer")
+            .props("flat dense")
+        )
+        table.columns[2]["headerClasses"] = "rosz-wide"
+        table.on(
+            "row-click",
+            lambda event: self._choose(event.args["name"]),
+            js_handler="(event, row) => emit({name: row.name})",
+        )
+        search.on_value_change(lambda change: setattr(table, "filter", change.value or ""))
+        return table
+
+    def _add_form(self) -> None:
+        with ui.column().classes("rosz-card p-4 gap-2 min-w-0"):
+            self._name = ui.label("Choose a service.").classes("text-base font-semibold break-all")
+            self._type = ui.label("").classes("rosz-soft")
+            self._text = (
+                ui.textarea("Request in YAML; fields left out have their default value")
+                .props("outlined autogrow input-class=rosz-mono")
+                .classes("w-full")
+            )
+            self._button = ui.button("Call", icon="send", on_click=self._call).props("no-caps")
+            self._button.disable()
+            self._answer = ui.label("").classes("rosz-mono whitespace-pre-wrap break-all w-full")
+
+    def _refresh(self) -> None:
+        own = self._system.node.name
+        entries = [
+            one
+            for one in list_services(self._graph.survey().view)
+            if one.nodes != (own,) and (self._all.value or not one.name.endswith(_HIDDEN))
+        ]
+        self._types = {one.name: one.types[0] for one in entries}
+        rows = [
+            {"name": one.name, "type": ", ".join(one.types), "nodes": ", ".join(one.nodes)}
+            for one in entries
+        ]
+        if self._table.rows != rows:
+            self._table.rows = rows
+        if self._wanted in self._types:
+            self._choose(self._wanted)
+        self._empty.set_visibility(not rows and self._graph.complete and not self._all.value)
+
+    def _choose(self, name: str) -> None:
+        self._wanted = ""
+        type_name = self._types.get(name, "")
+        self._name.set_text(name)
+        self._type.set_text(type_name)
+        self._answer.set_text("")
+        self._button.enable()
+        address_of(f"/services?{urlencode({'service': name}, safe='/')}")
+        try:
+            self._text.set_value(
+                form_of(self._system.node.context.types.service(type_name).Request)
+            )
+        except RoszError as error:
+            self._text.set_value("")
+            self._answer.set_text(str(error))
+
+    async def _call(self) -> None:
+        name, text = self._name.text, self._text.value
+        self._button.disable()
+        self._answer.set_text("waiting for the answer …")
+        answer = await self._frame.attempt(
+            lambda: call_service(
+                self._system.node, self._system.permission, self._graph.survey().view, name, text
+            )
+        )
+        self._answer.set_text("the call failed" if answer is None else answer or "(empty response)")
+        self._button.enable()

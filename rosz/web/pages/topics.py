@@ -1,0 +1,299 @@
+"""One topic: its newest message, what flows, and a form to publish."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from rosz.errors import RoszError
+from rosz.introspect.fields import FieldPath
+from rosz.introspect.topics import find_topic, list_topics
+from rosz.names import short_type
+from rosz.web.model import Sending, System, TopicWatch, form_of, message_tree
+from rosz.web.pages.layout import (
+    Frame,
+    address_of,
+    bandwidth_text,
+    rate_text,
+    size_text,
+)
+
+__all__ = ("show_topics",)
+
+_PERIOD = 0.25
+_LIST_PERIOD = 1.0
+_MILLI = 1e3
+_FASTEST = 1000.0
+
+
+def show_topics(system: System, topic: str, field: str) -> None:
+    """Build the page.
+
+    Args:
+        system: The system.
+        topic: Topic to show; empty for none.
+        field: Path of the field to show; empty for the whole message.
+    """
+    _Topics(system, topic, field)
+
+
+class _Topics:
+    """The choice of a topic, and the topic."""
+
+    def __init__(self, system: System, topic: str, field: str) -> None:
+        self._system = system
+        self._frame = frame = Frame(system, "Topics", "/topics")
+        self._graph = frame.use(system.graph)
+        self._field = field
+        self._watch: TopicWatch | None = None
+        self._fault = ""
+        with frame.content:
+            with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+                self._select = (
+                    ui.select(
+                        [topic] if topic else [],
+                        value=topic or None,
+                        label="Topic",
+                        with_input=True,
+                        new_value_mode="add-unique",
+                        on_change=lambda change: self._choose(change.value),
+                    )
+                    .props("dense options-dense clearable")
+                    .classes("grow min-w-52")
+                )
+                self._path = (
+                    ui.input(
+                        "Field",
+                        value=field,
+                        placeholder="pose/position",
+                        on_change=lambda change: self._choose_field(change.value or ""),
+                    )
+                    .props("dense clearable debounce=400")
+                    .classes("w-40")
+                )
+                self._frozen = ui.switch("Freeze").props("dense")
+            with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
+                self._echo = _Echo()
+                self._publish = _Publish(system, frame)
+        frame.keep(self)
+        frame.every(_LIST_PERIOD, self._list)
+        frame.every(_PERIOD, self._refresh)
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        watch, self._watch = self._watch, None
+        if watch is not None:
+            watch.close()
+
+    def _list(self) -> None:
+        own = self._system.node.name
+        survey = self._graph.survey()
+        found = [
+            one.name
+            for one in list_topics(token for token in survey.view.tokens if token.node_name != own)
+        ]
+        chosen = self._select.value
+        options = sorted({*found, *((chosen,) if chosen else ())})
+        if self._select.options != options:
+            self._select.set_options(options, value=chosen)
+        if self._watch is None and chosen and chosen in found:
+            self._open(chosen)
+
+    def _choose(self, topic: str | None) -> None:
+        self.close()
+        self._echo.clear()
+        self._show_address()
+        if topic:
+            self._open(topic)
+
+    def _choose_field(self, field: str) -> None:
+        self._field = field
+        self._echo.clear()
+        self._show_address()
+
+    def _show_address(self) -> None:
+        query = {"topic": self._select.value, "field": self._field}
+        given = {name: value for name, value in query.items() if value}
+        address_of("/topics?" + urlencode(given, safe="/") if given else "/topics")
+
+    def _open(self, topic: str) -> None:
+        try:
+            self._system.permission.check("subscribe", topic)
+            survey = self._graph.survey()
+            find_topic(survey, topic)
+            self._watch = TopicWatch(self._system.node, survey, topic)
+        except RoszError as error:
+            self._fault = str(error) if self._graph.complete else ""
+            return
+        self._fault = ""
+        self._publish.offer(topic, short_type(self._watch.type_name))
+
+    def _refresh(self) -> None:
+        watch = self._watch
+        if watch is None:
+            self._echo.show_nothing(self._select.value, self._fault)
+            return
+        message = watch.message()
+        self._echo.show_flow(watch)
+        if message is None or self._frozen.value:
+            return
+        try:
+            value = FieldPath(self._field).read(message) if self._field else message
+        except (LookupError, AttributeError, RoszError) as error:
+            self._echo.show_nothing(watch.topic, f"no field '{self._field}' in it: {error}")
+            return
+        self._echo.show(message_tree(value, self._field or short_type(watch.type_name)))
+
+
+class _Echo:
+    """The newest message as a tree."""
+
+    def __init__(self) -> None:
+        self._ids: set[str] = set()
+        self._shown: object = None
+        with ui.column().classes("rosz-card w-full p-4 gap-2 min-w-0"):
+            with ui.row().classes("w-full gap-4 items-center"):
+                ui.label("Newest message").classes("text-base font-semibold")
+                ui.space()
+                self._flow = ui.label("").classes("rosz-soft rosz-number text-sm")
+            self._note = ui.label("Choose a topic.").classes("rosz-soft")
+            self._tree = ui.tree([], node_key="id", label_key="name").props("dense no-transition")
+            self._tree.classes("rosz-mono w-full overflow-auto").style("max-height: 65vh")
+            self._tree.add_slot(
+                "default-header",
+                "<span>{{ props.node.name }}</span><span v-if=\"props.node.value !== ''\""
+                ' class="rosz-value">: {{ props.node.value }}</span>',
+            )
+
+    def clear(self) -> None:
+        """Forget what is shown."""
+        self._ids = set()
+        self._shown = None
+        self._flow.set_text("")
+        self._set_tree([])
+
+    def _set_tree(self, nodes: list[dict[str, Any]]) -> None:
+        self._tree.props["nodes"] = nodes
+        self._tree.update()
+        self._tree.set_visibility(bool(nodes))
+
+    def show_nothing(self, topic: str | None, fault: str) -> None:
+        """Say why nothing is shown."""
+        text = fault or (f"Waiting for '{topic}'." if topic else "Choose a topic.")
+        if self._note.text != text:
+            self._note.set_text(text)
+        self._note.set_visibility(True)
+
+    def show_flow(self, watch: TopicWatch) -> None:
+        """Show what flows."""
+        flow, delay = watch.flow(), watch.delay()
+        parts = [short_type(watch.type_name)]
+        if flow is not None:
+            parts += [rate_text(flow.rate), bandwidth_text(flow.bandwidth), size_text(flow.size)]
+        if delay is not None:
+            parts.append(f"{delay.mean * _MILLI:.1f} ms old")
+        self._flow.set_text(" · ".join(parts))
+        text = "" if watch.received else "No message has come yet."
+        if self._note.text != text:
+            self._note.set_text(text)
+            self._note.set_visibility(bool(text))
+
+    def show(self, tree: dict[str, Any]) -> None:
+        """Show a message; what is new in it is opened."""
+        if tree == self._shown:
+            return
+        self._shown = tree
+        self._set_tree([tree])
+        ids = set(_ids(tree))
+        if new := ids - self._ids:
+            self._ids |= ids
+            self._tree.expand(list(new))
+
+
+def _ids(tree: dict[str, Any]) -> list[str]:
+    found = [tree["id"]] if tree.get("children") else []
+    for child in tree.get("children", ()):
+        found += _ids(child)
+    return found
+
+
+class _Publish:
+    """The form that publishes."""
+
+    def __init__(self, system: System, frame: Frame) -> None:
+        self._system = system
+        self._frame = frame
+        self._sending: Sending | None = None
+        frame.keep(self)
+        with ui.column().classes("rosz-card w-full p-4 gap-2 min-w-0"):
+            ui.label("Publish").classes("text-base font-semibold")
+            with ui.row().classes("w-full gap-3"):
+                self._topic = ui.input("Topic").props("dense").classes("grow")
+                self._type = (
+                    ui.input("Type", placeholder="std_msgs/String").props("dense").classes("grow")
+                )
+            self._text = (
+                ui.textarea("Fields in YAML; those left out have their default value")
+                .props("outlined autogrow input-class=rosz-mono")
+                .classes("w-full")
+            )
+            with ui.row().classes("w-full items-center gap-3"):
+                ui.button("Fill in", on_click=self._fill).props("flat no-caps")
+                ui.button("Publish once", icon="send", on_click=self._send).props("no-caps")
+                self._rate = (
+                    ui.number("Hz", value=10, min=0.01, max=_FASTEST).props("dense").classes("w-16")
+                )
+                self._repeat = ui.button("Repeat", icon="repeat", on_click=self._toggle).props(
+                    "outline no-caps"
+                )
+                self._sent = ui.label("").classes("rosz-soft text-sm")
+        ui.timer(0.5, self._count)
+
+    def offer(self, topic: str, type_name: str) -> None:
+        """Fill in a topic and its type, unless the form is of that topic already."""
+        if (self._topic.value, self._type.value) == (topic, type_name):
+            return
+        self.close()
+        self._topic.set_value(topic)
+        self._type.set_value(type_name)
+        self._fill()
+
+    def _fill(self) -> None:
+        try:
+            self._text.set_value(form_of(self._system.node.context.types.message(self._type.value)))
+        except (RoszError, ValueError) as error:
+            ui.notify(str(error), type="negative")
+
+    def _open(self) -> Sending:
+        topic, type_name = self._topic.value.strip(), self._type.value.strip()
+        name = self._system.node.resolve(topic)
+        if self._sending is None or self._sending.named != (name, type_name):
+            self.close()
+            self._sending = Sending(self._system.node, self._system.permission, topic, type_name)
+        return self._sending
+
+    async def _send(self) -> None:
+        text = self._text.value
+        await self._frame.attempt(lambda: self._open().send(text), f"published {self._topic.value}")
+
+    async def _toggle(self) -> None:
+        if self._sending is not None and self._sending.repeats:
+            self._sending.stop()
+        else:
+            text, rate = self._text.value, min(_FASTEST, max(0.01, float(self._rate.value or 1)))
+            await self._frame.attempt(lambda: self._open().repeat(text, rate))
+        self._count()
+
+    def _count(self) -> None:
+        sending = self._sending
+        repeats = sending is not None and sending.repeats
+        self._repeat.set_text("Stop" if repeats else "Repeat")
+        self._sent.set_text(f"{sending.sent} sent" if sending is not None and sending.sent else "")
+
+    def close(self) -> None:
+        """Publish no more."""
+        sending, self._sending = self._sending, None
+        if sending is not None:
+            sending.close()

@@ -1,0 +1,157 @@
+"""What pages change, without pages: messages, calls, parameters, and the log that they show."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+from network import TIMEOUT, Network, eventually
+
+from rosz.errors import UsageError, YamlError
+from rosz.introspect.rosout import LogFilter
+from rosz.msgs.geometry_msgs.msg import PoseStamped, Twist
+from rosz.msgs.std_msgs.msg import Float64MultiArray, String
+from rosz.msgs.std_srvs.srv import SetBool
+from rosz.web.model import (
+    LogBook,
+    Parameters,
+    Permission,
+    Sending,
+    System,
+    TopicWatch,
+    call_service,
+    form_of,
+    message_tree,
+)
+from rosz.web.model.sending import read_form
+
+
+def test_forms_have_all_fields_and_take_some() -> None:
+    assert read_form(Twist, form_of(Twist), 0) == Twist()
+    assert read_form(PoseStamped, form_of(PoseStamped), 0) == PoseStamped()
+    assert read_form(Twist, "{linear: {x: 2}}", 0).linear.x == 2.0
+    assert read_form(Twist, " ", 0) == Twist()
+    with pytest.raises(UsageError, match="is not YAML"):
+        read_form(Twist, "{linear: ", 0)
+
+
+def test_a_tree_is_cut_where_it_is_long() -> None:
+    tree = message_tree(Float64MultiArray(data=[0.5] * 1000), "array")
+    data = tree["children"][1]
+    assert data["value"] == "1000 elements"
+    assert len(data["children"]) == 31
+    assert data["children"][-1]["value"] == "and 970 more"
+    assert message_tree("a" * 1000, "text")["value"].endswith('…"')
+
+
+def test_a_watched_topic_keeps_the_newest_message(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    publisher = robot.publisher("chatter", String, latch=True)
+    publisher.publish(String(data="first"))
+    system = System(page, Permission())
+    graph = system.graph.use().value
+    eventually(lambda: graph.survey().view.publishers("/chatter"), "the publisher")
+    watch = TopicWatch(page, graph.survey(), "/chatter")
+    eventually(lambda: watch.message() is not None, "the latched message")
+    publisher.publish(String(data="second"))
+    eventually(lambda: watch.message() == String(data="second"), "the newest message")
+    watch.close()
+
+
+def test_a_page_publishes_once_and_at_a_rate(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    got: list[Any] = []
+    enough = threading.Event()
+
+    def receive(message: Twist) -> None:
+        got.append(message.linear.x)
+        if got.count(2.0) >= 3:
+            enough.set()
+
+    robot.subscription("cmd_vel", Twist, receive)
+    with pytest.raises(UsageError, match="read-only"):
+        Sending(page, Permission(read_only=True), "/cmd_vel", "geometry_msgs/Twist")
+    sending = Sending(page, Permission(), "/cmd_vel", "geometry_msgs/Twist")
+    sending.send("linear: {x: 1}")
+    eventually(lambda: got == [1.0], "the message")
+    sending.repeat("linear: {x: 2}", 50)
+    assert enough.wait(TIMEOUT)
+    assert sending.repeats
+    sending.close()
+    assert not sending.repeats
+
+
+def test_a_page_calls_a_service(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    robot.service("enable", SetBool, lambda request: SetBool.Response(True, f"is {request.data}"))
+    page.context.graph.wait_for_service("/enable", TIMEOUT)
+    view = page.context.graph.refresh()
+    answer = call_service(page, Permission(), view, "/enable", "data: true")
+    assert 'message: "is True"' in answer
+    with pytest.raises(UsageError, match="read-only"):
+        call_service(page, Permission(read_only=True), view, "/enable", "")
+
+
+def test_parameters_keep_their_types(network: Network) -> None:
+    page = network.node("page")
+    parameters = Parameters(page, Permission())
+    page.params.set("/rate", 2.5)
+    page.params.set("/name", "arm")
+    parameters.set_text("/rate", "3")
+    assert page.params.get("/rate") == 3.0
+    assert isinstance(page.params.get("/rate"), float)
+    parameters.set_text("/name", "12")
+    assert page.params.get("/name") == "12"
+    with pytest.raises(UsageError, match=r"'/rate' is of type float, and fast of type str"):
+        parameters.set_text("/rate", "fast")
+    parameters.set_text("/rate", "fast", other_type=True)
+    assert parameters.values() == {"/rate": "fast", "/name": "12"} | {
+        name: value for name, value in parameters.values().items() if name not in {"/rate", "/name"}
+    }
+    eventually(lambda: len(parameters.changes()) >= 5, "the changes")
+    newest = parameters.changes()[0]
+    assert (newest.name, newest.old, newest.new) == ("/rate", 3.0, "fast")
+    parameters.close()
+
+
+def test_parameters_are_saved_and_loaded(network: Network) -> None:
+    page = network.node("page")
+    parameters = Parameters(page, Permission())
+    assert parameters.load("/", "arm: {speed: 1, joints: [a, b]}\nname: robot\n", "file.yaml") == 3
+    text = parameters.save("/arm")
+    page.params.delete("/arm")
+    assert parameters.load("/arm", text, "file.yaml") == 2
+    assert page.params.get("/arm") == {"speed": 1, "joints": ["a", "b"]}
+    with pytest.raises(YamlError, match=r"file\.yaml"):
+        parameters.load("/", "a: [", "file.yaml")
+    with pytest.raises(UsageError, match="read-only"):
+        Parameters(page, Permission(read_only=True)).load("/", "a: 1", "file.yaml")
+
+
+def test_the_log_is_bounded_and_filtered(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    book = LogBook(page)
+
+    def heard(text: str) -> bool:
+        robot.log.warning(text)
+        return bool(book.received)
+
+    eventually(lambda: heard("the first"), "a line of the log")
+    before = book.received
+    robot.log.info("it moves")
+    robot.log.error("it %s", "burns")
+    eventually(lambda: book.received >= before + 2, "all lines")
+
+    def texts(level: str = "DEBUG", pattern: str = "", until: int | None = None) -> list[str]:
+        lines = book.newest(LogFilter((), level, pattern), [robot.name], 100, until)
+        return [line.text for _, line in lines if line.text != "the first"]
+
+    assert texts() == ["it burns", "it moves"]
+    assert texts("ERROR") == ["it burns"]
+    assert texts(pattern="mov") == ["it moves"]
+    assert texts(until=book.received - 1) == ["it moves"]
+    assert len(book.newest(LogFilter(), [robot.name], 1)) == 1
+    book.clear()
+    assert texts() == []
+    book.close()
