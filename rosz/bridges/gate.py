@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from typing import Literal, TypeAlias
 
 import msgspec
@@ -10,7 +11,10 @@ import msgspec
 from rosz.errors import UsageError
 from rosz.security import Permit
 
-__all__ = ("Gate", "Verb", "matches")
+__all__ = ("Gate", "Pattern", "Verb", "matches")
+
+Pattern: TypeAlias = str | re.Pattern[str]
+"""A name with wildcards as in a shell, or a regular expression for whole names."""
 
 Verb: TypeAlias = Literal["publish", "subscribe", "call", "serve", "set", "get"]
 
@@ -27,13 +31,15 @@ class Gate(msgspec.Struct, frozen=True):
         topics: Patterns of the topics that clients see; all if there is none.
         services: Patterns of the services.
         params: Patterns of the parameters.
+        published: Patterns of the topics that clients publish; all that they see if there is none.
     """
 
     permit: Permit | None = None
     read_only: bool = False
-    topics: tuple[str, ...] = ()
-    services: tuple[str, ...] = ()
-    params: tuple[str, ...] = ()
+    topics: tuple[Pattern, ...] = ()
+    services: tuple[Pattern, ...] = ()
+    params: tuple[Pattern, ...] = ()
+    published: tuple[Pattern, ...] = ()
 
     def objection(self, verb: Verb, name: str) -> str:
         """Return why clients may not do something; empty if they may.
@@ -44,7 +50,8 @@ class Gate(msgspec.Struct, frozen=True):
         """
         if self.read_only and verb in _CHANGES:
             return f"clients may not {verb} '{name}': this bridge is read-only"
-        if not self.shows(_OBJECTS.get(verb, "params"), name):
+        hidden = verb == "publish" and not matches(self.published, name)
+        if hidden or not self.shows(_OBJECTS.get(verb, "params"), name):
             return f"clients may not {verb} '{name}': the patterns of this bridge leave it out"
         if self.permit is None:
             return ""
@@ -65,6 +72,9 @@ class Gate(msgspec.Struct, frozen=True):
         return matches(getattr(self, what), name)
 
 
-def matches(patterns: tuple[str, ...], name: str) -> bool:
+def matches(patterns: tuple[Pattern, ...], name: str) -> bool:
     """Return whether a name matches one of some patterns, or there are no patterns."""
-    return not patterns or any(fnmatch.fnmatchcase(name, one) for one in patterns)
+    return not patterns or any(
+        fnmatch.fnmatchcase(name, one) if isinstance(one, str) else one.fullmatch(name) is not None
+        for one in patterns
+    )

@@ -130,3 +130,57 @@ def websocket_command(
         print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
         while True:
             time.sleep(_LONG)
+
+
+@app.command("foxglove")
+def foxglove_command(
+    *,
+    port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 8765,
+    listen: Annotated[
+        str, Option("--listen ADDRESS", "Address to listen at, instead of 127.0.0.1.")
+    ] = "127.0.0.1",
+    password_file: Annotated[
+        str, Option("--password-file FILE", "File whose first line clients must know.")
+    ] = "",
+    origin: Annotated[
+        list[str] | None,
+        Option("--origin ORIGIN", "Pages that may connect, beside Foxglove's; repeatable."),
+    ] = None,
+    read_only: Annotated[bool, Option("--read-only", "Let clients change nothing.")] = False,
+    topics: Annotated[
+        list[str] | None, Option("--topics PATTERN", "Topics that clients see; repeatable.")
+    ] = None,
+    services: Annotated[
+        list[str] | None, Option("--services PATTERN", "Services that clients see; repeatable.")
+    ] = None,
+    params: Annotated[
+        list[str] | None, Option("--params PATTERN", "Parameters that clients see; repeatable.")
+    ] = None,
+    certificate: Annotated[str, Option("--certificate FILE", "Certificate for TLS.")] = "",
+    key: Annotated[str, Option("--key FILE", "Private key of the certificate.")] = "",
+) -> None:
+    """Serve Foxglove, Lichtblick and other viewers, until it is stopped."""
+    at_least("--port", port, 0, "as a port", _LAST_PORT)
+    from rosz.bridges.foxglove import Settings, open_bridge
+    from rosz.node import Node
+
+    settings = Settings(
+        host=listen,
+        port=port,
+        password_file=password_file,
+        origins=tuple(origin or ()),
+        read_only=read_only,
+        topics=tuple(topics or ()),
+        services=tuple(services or ()),
+        params=tuple(params or ()),
+        certificate=certificate,
+        key=key,
+    )
+    with until_stopped() as ready, ExitStack() as stack:
+        node = stack.enter_context(Node("foxglove_bridge", anonymous=True, argv=()))
+        bridge, lines = open_bridge(node, settings)
+        stack.callback(bridge.close)
+        ready()
+        print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
+        while True:
+            time.sleep(_LONG)

@@ -68,6 +68,7 @@ FLOORS = {
     "rosz.transforms": 6,
     "rosz.bridges": 7,
     "rosz.bridges.fleet.plan": 1,
+    "rosz.bridges.foxglove.protocol": 1,
     "rosz.bridges.ros1.calls": 1,
     "rosz.bridges.ros1.frames": 1,
     "rosz.bridges.ros1.registry": 1,

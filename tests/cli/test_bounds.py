@@ -76,6 +76,7 @@ LINES = {
     "bag split --duration {} a.bag": TIMES[1:],
     "bag split --size {} a.bag": LIMITS,
     "bridge websocket --port {}": ["-1", "65536"],
+    "bridge foxglove --port {}": ["-1", "65536"],
 }
 
 

@@ -67,17 +67,22 @@ class Message:
         cls: Class of the message.
         data: Its CDR.
         received: When it came, by the clock of the node, in nanoseconds.
+
+    Attributes:
+        data: Its CDR.
+        received: When it came, in nanoseconds.
+        size: Number of bytes.
     """
 
     def __init__(
         self, encodings: Encodings, topic: str, cls: type[Any], data: bytes, received: int
     ) -> None:
+        self.data = data
+        self.received = received
         self.size: int = len(data)
         self._encodings = encodings
         self._topic = topic
         self._cls = cls
-        self._data = data
-        self._received = received
         self._lock = threading.Lock()
         self._encoded: dict[Form, bytes] = {}
 
@@ -104,7 +109,7 @@ class Message:
     def _encode(self, compression: Compression, spelling: Spelling) -> bytes:
         if compression == "cbor-raw":
             return self._cbor(self._raw(spelling))
-        message = self._cls.from_cdr(self._data)
+        message = self._cls.from_cdr(self.data)
         if compression == "cbor":
             from cbor2 import CBORTag
 
@@ -113,16 +118,16 @@ class Message:
         return msgspec.json.encode({"op": "publish", "topic": self._topic, "msg": plain})
 
     def _raw(self, spelling: Spelling) -> dict[str, Any]:
-        seconds, rest = divmod(self._received, 1_000_000_000)
+        seconds, rest = divmod(self.received, 1_000_000_000)
         if spelling == "ros2":
             return {
                 "sec": seconds,
                 "nanosec": rest,
                 "secs": seconds,
                 "nsecs": rest,
-                "bytes": self._data,
+                "bytes": self.data,
             }
-        data = self._cls.from_cdr(self._data).to_ros1()
+        data = self._cls.from_cdr(self.data).to_ros1()
         return {"secs": seconds, "nsecs": rest, "bytes": data}
 
     def _cbor(self, message: dict[str, Any]) -> bytes:
@@ -186,7 +191,7 @@ class Outbox:
 
     Args:
         limit: Largest number of bytes that wait. The oldest messages of a topic give way to newer
-            ones, except the newest. Answers beyond the limit end the connection.
+            ones, except the newest. When answers pass the limit, the next one ends the connection.
         wake: Function that is called when there is something to send.
         overflow: Function that is called when there are too many answers.
     """
@@ -209,7 +214,7 @@ class Outbox:
         with self._lock:
             if self._closed:
                 return
-            full = bool(self._answers) and self._answered + len(answer) > self._limit
+            full = self._answered > self._limit  # so that a large one alone is sent
             if full:
                 self._closed = True
             else:

@@ -79,7 +79,7 @@ class Topics:
             feed: The feed.
             offer: Function that takes each message, on threads of the node.
         """
-        key = (topic, cls._type_name if cls else "")
+        key = (topic, cls._type_hash if cls else "")
         with self._lock:
             source = next((one for one in self._sources.values() if one.has(feed)), None)
             source = source or self._sources.get(key)
@@ -147,15 +147,20 @@ class _Source:
         self._latching: dict[bytes, bool] = {}
         self._kept: dict[bytes, Message] = {}
         self._lock = threading.RLock()
-        self._subscription: Subscription[Any] = node.subscription(
-            topic, cls, self._receive, queue_size=100, raw=True, with_info=True
-        )
+        with self._lock:  # a message may come before the subscription is assigned
+            self._subscription: Subscription[Any] = node.subscription(
+                topic, cls, self._receive, queue_size=100, raw=True, with_info=True
+            )
 
     def add(self, feed: Feed, offer: Offer) -> None:
         """Add a feed; it gets the last message of each latching publisher."""
         with self._lock:
             alive = {gid(format_token(token)) for token in self._subscription.publishers()}
-            self._kept = {key: kept for key, kept in self._kept.items() if key in alive}
+            self._kept = {
+                key: kept
+                for key, kept in self._kept.items()
+                if key in alive and self._is_latching(key)
+            }
             self._feeds[feed] = offer
             for kept in self._kept.values():
                 offer(feed, kept)
@@ -186,13 +191,12 @@ class _Source:
             offer(feed, message)
 
     def _is_latching(self, publisher: bytes) -> bool:
+        """Return whether a publisher latches, or may, as its token has not come."""
         if publisher not in self._latching:
-            self._latching[publisher] = any(
-                token.qos is not None and token.qos.latched
-                for token in self._subscription.publishers()
-                if gid(format_token(token)) == publisher
-            )
-        return self._latching[publisher]
+            for token in self._subscription.publishers():
+                if gid(format_token(token)) == publisher and token.qos is not None:
+                    self._latching[publisher] = token.qos.latched
+        return self._latching.get(publisher, True)
 
     def _class_of(self, type_name: str, type_hash: str) -> type[Any] | None:
         kind = (type_name, type_hash)

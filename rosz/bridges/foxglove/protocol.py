@@ -1,0 +1,254 @@
+"""The messages of the Foxglove websocket protocol, version 1; pure.
+
+Texts are JSON objects with an ``op``. Binary messages begin with a number that says what they are.
+Numbers in them are little-endian (github.com/foxglove/ws-protocol, docs/spec.md).
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Annotated, Any, Literal, TypeAlias
+
+import msgspec
+
+from rosz.errors import UsageError
+
+__all__ = (
+    "SUBPROTOCOLS",
+    "Advertise",
+    "ChannelChoice",
+    "ClientChannel",
+    "ClientMessage",
+    "FetchAsset",
+    "GetParameters",
+    "Level",
+    "Parameter",
+    "Publish",
+    "ServiceCall",
+    "SetParameters",
+    "Subscribe",
+    "SubscribeConnectionGraph",
+    "SubscribeParameterUpdates",
+    "Unadvertise",
+    "Unsubscribe",
+    "UnsubscribeConnectionGraph",
+    "UnsubscribeParameterUpdates",
+    "asset_frame",
+    "data_frame",
+    "op_name",
+    "read",
+    "refusal_frame",
+    "response_frame",
+    "time_frame",
+)
+
+SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+"""Names of the protocol: that of today's clients, and that of older ones."""
+
+Level: TypeAlias = Literal[0, 1, 2]
+"""Of a status message: information, warning or error."""
+
+_Number = Annotated[int, msgspec.Meta(ge=0, le=0xFFFF_FFFF)]
+_DATA, _TIME, _RESPONSE, _ASSET = 1, 2, 3, 4
+_CALL = 2
+
+
+def _op(name: str) -> str:
+    return name[0].lower() + name[1:]
+
+
+class _Message(msgspec.Struct, frozen=True, kw_only=True, tag_field="op", tag=_op):
+    """A message that a client sends as JSON."""
+
+
+class ChannelChoice(msgspec.Struct, frozen=True, rename="camel"):
+    """A channel that a client subscribes to, under a number of its own."""
+
+    id: _Number
+    channel_id: _Number
+
+
+class Subscribe(_Message, frozen=True):
+    """A client subscribes to channels."""
+
+    subscriptions: list[ChannelChoice]
+
+
+class Unsubscribe(_Message, frozen=True, rename="camel"):
+    """A client ends subscriptions."""
+
+    subscription_ids: list[_Number]
+
+
+class ClientChannel(msgspec.Struct, frozen=True, rename="camel"):
+    """A channel that a client publishes on."""
+
+    id: _Number
+    topic: str
+    encoding: str
+    schema_name: str
+    schema: str | None = None
+    schema_encoding: str | None = None
+
+
+class Advertise(_Message, frozen=True):
+    """A client begins to publish."""
+
+    channels: list[ClientChannel]
+
+
+class Unadvertise(_Message, frozen=True, rename="camel"):
+    """A client ends channels on which it publishes."""
+
+    channel_ids: list[_Number]
+
+
+class Parameter(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A parameter; one without a value is not set."""
+
+    name: str
+    value: Any = msgspec.UNSET
+    type: str | None = None
+
+
+class GetParameters(_Message, frozen=True, rename="camel"):
+    """A client reads parameters; all if it names none."""
+
+    parameter_names: list[str]
+    id: str | None = None
+
+
+class SetParameters(_Message, frozen=True):
+    """A client sets parameters, or deletes those without a value."""
+
+    parameters: list[Parameter]
+    id: str | None = None
+
+
+class SubscribeParameterUpdates(_Message, frozen=True, rename="camel"):
+    """A client follows parameters; all if it names none."""
+
+    parameter_names: list[str]
+
+
+class UnsubscribeParameterUpdates(_Message, frozen=True, rename="camel"):
+    """A client follows parameters no longer; none at all if it names none."""
+
+    parameter_names: list[str]
+
+
+class SubscribeConnectionGraph(_Message, frozen=True):
+    """A client follows who publishes, subscribes and serves."""
+
+
+class UnsubscribeConnectionGraph(_Message, frozen=True):
+    """A client follows the graph no longer."""
+
+
+class FetchAsset(_Message, frozen=True, rename="camel"):
+    """A client fetches a file."""
+
+    uri: str
+    request_id: _Number
+
+
+class Publish(msgspec.Struct, frozen=True, tag_field="op", tag="message"):
+    """A binary message with data for a channel of the client."""
+
+    channel: int
+    data: bytes
+
+
+class ServiceCall(msgspec.Struct, frozen=True, tag_field="op", tag="service call"):
+    """A binary message that calls a service."""
+
+    service: int
+    call: int
+    encoding: str
+    data: bytes
+
+
+_Json: TypeAlias = (
+    Subscribe
+    | Unsubscribe
+    | Advertise
+    | Unadvertise
+    | GetParameters
+    | SetParameters
+    | SubscribeParameterUpdates
+    | UnsubscribeParameterUpdates
+    | SubscribeConnectionGraph
+    | UnsubscribeConnectionGraph
+    | FetchAsset
+)
+ClientMessage: TypeAlias = _Json | Publish | ServiceCall
+"""A message of a client."""
+
+_json_decoder: msgspec.json.Decoder[_Json] = msgspec.json.Decoder(_Json)
+
+
+def read(message: str | bytes) -> ClientMessage:
+    """Parse a message of a client.
+
+    Raises:
+        UsageError: It is none of the protocol.
+    """
+    if isinstance(message, bytes):
+        return _read_binary(message)
+    try:
+        return _json_decoder.decode(message)
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise UsageError(f"not a message of the protocol: {error}, in {message[:100]!r}") from error
+
+
+def _read_binary(message: bytes) -> Publish | ServiceCall:
+    try:
+        if message[:1] == bytes((_DATA,)):
+            (channel,) = struct.unpack_from("<I", message, 1)
+            return Publish(channel, message[5:])
+        if message[:1] == bytes((_CALL,)):
+            service, call, size = struct.unpack_from("<III", message, 1)
+            encoding, data = message[13 : 13 + size], message[13 + size :]
+            if len(encoding) == size:
+                return ServiceCall(service, call, encoding.decode(), data)
+    except (struct.error, UnicodeDecodeError) as error:
+        raise UsageError(
+            f"a binary message of {len(message)} bytes is not whole: {error}"
+        ) from error
+    raise UsageError(
+        f"a binary message begins with {message[:13]!r}: expected 1 and a channel, or 2, a service,"
+        " a call and an encoding"
+    )
+
+
+def op_name(message: ClientMessage) -> str:
+    """Return the name of what a client does with a message."""
+    return str(message.__struct_config__.tag)
+
+
+def data_frame(subscription: int, time_ns: int, data: bytes) -> bytes:
+    """Return a message of a channel, for a subscription."""
+    return struct.pack("<BIQ", _DATA, subscription, time_ns) + data
+
+
+def time_frame(time_ns: int) -> bytes:
+    """Return a message with the time, in nanoseconds."""
+    return struct.pack("<BQ", _TIME, time_ns)
+
+
+def response_frame(call: ServiceCall, data: bytes) -> bytes:
+    """Return the response to a call."""
+    encoding = call.encoding.encode()
+    head = struct.pack("<BIII", _RESPONSE, call.service, call.call, len(encoding))
+    return head + encoding + data
+
+
+def asset_frame(request: int, data: bytes) -> bytes:
+    """Return a file that was fetched."""
+    return struct.pack("<BIBI", _ASSET, request, 0, 0) + data
+
+
+def refusal_frame(request: int, reason: str) -> bytes:
+    """Return why a file cannot be fetched."""
+    text = reason.encode("utf-8", "replace")
+    return struct.pack("<BIBI", _ASSET, request, 1, len(text)) + text
