@@ -2,7 +2,8 @@
 
 Rates of conversions stand beside those of rosbridge_library, in both directions. Then a node
 publishes clouds of 10 MB, to one node and to eight clients of a bridge in turn: publishing should
-take no longer. The last figure is the processor time of a bridge whose client is silent.
+take no longer. Images of 6 MB go to a Foxglove client, beside Foxglove's own library if it is
+installed. The last figures are the processor time of bridges whose client is silent.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from ..figures import busy, table  # found by the line above  # noqa: TID252  # tests is no package
+from . import foxglove
 from .conversions import measure
 from .websocket import clouds, idle
 
@@ -23,15 +25,19 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--library", type=Path, help="rosbridge_library/src of a ROS 1 checkout")
     parser.add_argument("--rounds", type=int, default=3, help="how often each is measured")
-    parser.add_argument("--only", choices=("conversions", "clouds", "idle"), help="one part")
+    parser.add_argument(
+        "--only", choices=("conversions", "clouds", "images", "idle"), help="one part"
+    )
     options = parser.parse_args()
     figures = []
     if options.only in (None, "conversions"):
         figures += measure(options.library, options.rounds, 1.0)
     if options.only in (None, "clouds"):
         figures += clouds(options.rounds)
+    if options.only in (None, "images"):
+        figures += foxglove.images(options.rounds)
     if options.only in (None, "idle"):
-        figures.append(idle(10.0))
+        figures += [idle(10.0), foxglove.idle(10.0)]
     print(table(figures))
     print(busy())
 
