@@ -374,10 +374,12 @@ def test_a_client_that_never_reads(network: Network) -> None:
 def test_a_client_that_never_reads_answers(network: Network) -> None:
     limits = Limits(waiting=1 << 20)
     with bridge_on(network, limits=limits) as bridge, bridge.client(max_queue=1) as client:
-        network.node("other").params["/text"] = "x" * 500_000
+        network.node("other").params["/text"] = "x" * 1_000_000
         eventually(lambda: bridge.node.params.has("/text"), "the parameter")
-        for _ in range(60):  # more than what sockets hold
+        for _ in range(100):  # more than what sockets hold
             client.send("getParameters", parameterNames=["/text"])
+        client.send("setParameters", parameters=[{"name": "/asked", "value": True}])
+        eventually(lambda: bridge.node.params.has("/asked"), "the answers")
         with pytest.raises(ConnectionClosed, match="answers wait that the client does not read"):
             client.wait(lambda _: False)
 
