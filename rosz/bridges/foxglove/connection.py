@@ -90,7 +90,7 @@ class _Watched(Feed):
     """The messages that wait for one subscription of a client."""
 
     def __init__(self, subscription: int, channel: int) -> None:
-        super().__init__(("cbor-raw", "ros2"))
+        super().__init__()
         self.subscription = subscription
         self.channel = channel
 
@@ -99,7 +99,7 @@ class _Time(Feed):
     """The newest time that waits for a client."""
 
     def __init__(self) -> None:
-        super().__init__(("cbor-raw", "ros2"))
+        super().__init__()
         self.depth = 1
 
 
