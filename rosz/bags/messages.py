@@ -197,14 +197,21 @@ class BagOutput:
     Args:
         writer: Writer of its format.
         now: Function that returns the time of messages without a stamp.
+        to_ros1: Function that translates channels, for a bag that holds ROS 1's layout.
 
     Attributes:
         writer: As given.
     """
 
-    def __init__(self, writer: BagWriter, now: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        writer: BagWriter,
+        now: Callable[[], int],
+        to_ros1: Callable[[Channel], Channel] | None = None,
+    ) -> None:
         self.writer = writer
         self._now = now
+        self._to_ros1 = to_ros1
         self._handles: dict[tuple[str, Any], int] = {}
 
     def write(self, topic: str, message: Message, stamp: int | None = None) -> None:
@@ -222,17 +229,18 @@ class BagOutput:
         cls = type(message)
         handle = self._handles.get((topic, cls))
         if handle is None:
-            handle = self.writer.add(
-                Channel(
-                    topic,
-                    cls._type_name,
-                    definition=cls._full_text,
-                    md5=cls._md5sum,
-                    type_hash=cls._type_hash,
-                )
+            channel = Channel(
+                topic,
+                cls._type_name,
+                definition=cls._full_text,
+                md5=cls._md5sum,
+                type_hash=cls._type_hash,
             )
-            self._handles[topic, cls] = handle
-        self.writer.write(handle, self._now() if stamp is None else stamp, message.to_cdr())
+            if self._to_ros1 is not None:
+                channel = self._to_ros1(channel)
+            handle = self._handles[topic, cls] = self.writer.add(channel)
+        data = message.to_cdr() if self._to_ros1 is None else message.to_ros1()
+        self.writer.write(handle, self._now() if stamp is None else stamp, data)
 
     def close(self) -> None:
         """Finish the file with its index; a second call has no effect.

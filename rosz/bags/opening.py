@@ -215,7 +215,8 @@ def open(  # noqa: A001
     Args:
         path: Path of the bag. When it is written, its suffix tells the format.
         mode: ``r`` to read, ``w`` to write a new file or replace one, ``x`` to write a new one.
-        compression: Compression of a bag that is written: ``none``, ``lz4`` or ``zstd``.
+        compression: Compression of a bag that is written: ``none``, ``lz4``, ``zstd`` for MCAP, or
+            ``bz2`` for a bag of ROS 1.
         types: Types for channels without a definition; those that come with rosz when not given.
 
     Raises:
@@ -229,4 +230,10 @@ def open(  # noqa: A001
 
         return Bag(open_reader(path), types or TypeStore())
     writer = create_writer(path, compression=compression, replace=mode == "w")
-    return BagOutput(writer, time.time_ns)
+    if writer.format != "rosbag":
+        return BagOutput(writer, time.time_ns)
+    from rosz.bags.ros1_form import to_ros1
+    from rosz.typestore import TypeStore
+
+    known = types or TypeStore()
+    return BagOutput(writer, time.time_ns, lambda channel: to_ros1(channel, known)[0])

@@ -239,6 +239,7 @@ class BagFiles:
     Args:
         options: Their names and limits.
         report: Function called with a sentence for the user.
+        first: Number of the first bag, where they are numbered.
 
     Attributes:
         begin: Function called when a further bag has been opened, to write what each begins with.
@@ -255,13 +256,14 @@ class BagFiles:
         self,
         options: RecordOptions,
         report: Callable[[str], object],
+        first: int = 0,
     ) -> None:
         self._options = options
         self._report = report
         self.begin: Callable[[BagFiles], object] | None = None
         self._lock = threading.RLock()
         self._tracks: list[Track] = []
-        self._index = count()
+        self._index = count(first)
         self._start = 0
         self._written = 0
         self._closed = False
@@ -476,6 +478,7 @@ class Ring:
         self._rows: deque[tuple[Track, int, Payload, int | None, int]] = deque()
         self._bytes = 0
         self._tracks: dict[Track, TypeStore] = {}
+        self._saved = 0
         self.end: Callable[[BagFiles], object] | None = None
         self.count: int = 0
 
@@ -531,6 +534,8 @@ class Ring:
     def save(self, now: int) -> Path:
         """Write what is kept into a bag, which begins with the last latched messages before it.
 
+        From the second one on, bags whose name is given are numbered.
+
         Args:
             now: Current time, in nanoseconds.
 
@@ -544,8 +549,9 @@ class Ring:
             self._trim(now)
             rows, tracks = list(self._rows), dict(self._tracks)
             latched = [(track, track.last) for track in tracks if track.last is not None]
-        options = msgspec.structs.replace(self._options, duration=0, size=0, buffer=0)
-        with BagFiles(options, self._report) as files:
+        split = self._options.split or bool(self._options.name and self._saved)
+        options = msgspec.structs.replace(self._options, duration=0, size=0, buffer=0, split=split)
+        with BagFiles(options, self._report, self._saved) as files:
             made = {track: files.track(track.channel, types) for track, types in tracks.items()}
             for track, last in latched:
                 files.write(made[track], rows[0][1] if rows else now, *last)
@@ -553,4 +559,5 @@ class Ring:
                 files.write(made[track], stamp, data, sent, sequence)
             if self.end is not None:
                 self.end(files)
+        self._saved += 1
         return files.done[-1]

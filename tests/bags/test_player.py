@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -10,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from network import Network, eventually
+from network import TIMEOUT, Network, eventually
 
 import rosz.bags
 from rosz.bags import Channel, open_reader
@@ -214,6 +217,46 @@ def test_without_waiting_only_what_is_heard_is_published(network: Network, tmp_p
     heard.wait(1000)
     assert heard.values == list(range(1, 2000, 2))
     assert (player.published, one._sequence, other._sequence) == (2000, 0, 1000)
+
+
+def test_keys_of_a_terminal(network: Network, tmp_path: Path) -> None:
+    bag = _bag(tmp_path / "a.mcap", [("/a", n / 1000, Int32(data=n)) for n in range(9)])
+    heard = _Listener(network, "/a")
+    ours, theirs = os.openpty()
+    words = ("--pause", "--wait-for-subscribers", str(bag))
+    program = subprocess.Popen(
+        [sys.executable, "-P", "-m", "rosz", "bag", "play", *words],
+        env=network.variables() | {"TERM": "xterm"},
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        start_new_session=True,
+    )
+    os.close(theirs)
+    shown = b""
+
+    def wait_for(text: bytes) -> None:
+        nonlocal shown
+        while text not in shown:
+            shown += os.read(ours, 1 << 16)
+
+    try:
+        wait_for(b"PAUSED")
+        for count in (1, 2, 3):
+            os.write(ours, b"s")
+            heard.wait(count)
+        os.write(ours, b"x\x1b[A")
+        wait_for(b"1.10 x")
+        assert heard.values == [0, 1, 2]
+        os.write(ours, b" ")
+        heard.wait(9)
+        wait_for(b"Done.")
+        assert program.wait(TIMEOUT) == 0
+    finally:
+        program.kill()
+        program.wait()
+        os.close(ours)
+    assert heard.values == list(range(9))
 
 
 def test_a_topic_controls_the_rate(network: Network, tmp_path: Path) -> None:

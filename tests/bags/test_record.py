@@ -478,6 +478,22 @@ def test_snapshots_are_of_the_last_seconds(network: Network) -> None:
     assert not list(network.folder.glob("*.active"))
 
 
+def test_named_snapshots_are_numbered(network: Network) -> None:
+    program = record(network, "-a", "--snapshot", "60", "-O", "snap")
+    program.wait_for("SIGUSR1")
+    for name in ("snap.mcap", "snap_1.mcap"):
+        program.send(signal.SIGUSR1)
+        eventually((network.folder / name).exists, name)
+    (network.folder / "snap_2.mcap").touch()
+    program.send(signal.SIGUSR1)
+    program.wait_for("snap_2.mcap: it exists already")
+    (network.folder / "snap_2.mcap").unlink()
+    program.send(signal.SIGUSR1)
+    eventually((network.folder / "snap_2.mcap").exists, "snap_2.mcap")
+    program.send(signal.SIGINT)
+    assert program.exit_code() == 0
+
+
 @pytest.mark.ros1
 def test_a_bag_of_ros_1(network: Network) -> None:
     require("rosbag", package="python3-rosbag")

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from oracle import PYTHON, require
 
+import rosz.bags
 from bags.messages import MESSAGES
 from rosz.bags import Channel, Compression, open_reader
 from rosz.bags.opening import create_file
@@ -52,6 +53,15 @@ def write(path: Path, compression: Compression = "none", times: int = 3) -> None
                 handle, translate = handles[topic]
                 stamp = START + number * 1_000_000_000 + index
                 writer.write(handle, stamp, translate(message.to_cdr(), number))
+
+
+def test_programs_write_messages_into_it(tmp_path: Path) -> None:
+    with rosz.bags.open(tmp_path / "a.bag", "w", compression="bz2") as bag:
+        for number, (topic, message) in enumerate(MESSAGES.items()):
+            bag.write(topic, message, START + number)
+    with rosz.bags.open(tmp_path / "a.bag") as bag:
+        assert {one.encoding for one in bag.channels} == {"ros1"}
+        assert [(one.topic, one.message) for one in bag.messages()] == list(MESSAGES.items())
 
 
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])

@@ -243,7 +243,10 @@ def _keep_last(
         def look() -> None:
             if signalled.is_set():
                 signalled.clear()
-                save()
+                try:
+                    save()
+                except BagError as error:  # the next one may succeed
+                    print_error(f"ERROR: {error}")
 
         _run(node, recorder, ring, options, report, finished=recorder.ended, look=look)
 
