@@ -6,8 +6,9 @@ import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -125,7 +126,8 @@ def launch_command(
     if agent:
         from rosz.launch.run.agent import serve
 
-        serve()
+        with ExitStack() as stack:
+            serve(partial(_find_master, stack))
         return 0
     _check_named(args=args, find_node=find_node, restart=restart, stop=stop)
     if status or restart or stop:
@@ -279,20 +281,39 @@ class _Launch:
 
         A master that the environment names and that is running stays theirs.
         """
+        from rosz.launch.run import is_local
+
         place = self.workplace()
-        programs = [node.name for node in plan.nodes if place.may_need_master(node)]
+        local = [node for node in plan.nodes if is_local(plan.machine(node.machine))]
+        programs = [node.name for node in local if place.may_need_master(node)]
         if not programs:
             return
-        from rosz.bridges.ros1 import open_master, running_master
-
-        uri = running_master(self.environ)
-        whose = "running"
-        if not uri:
-            bridge = stack.enter_context(open_master(self.environment))
-            uri, whose = f"http://127.0.0.1:{bridge.port}", "this launch's"
-            self.environ = {"ROS_IP": "127.0.0.1", **self.environ, "ROS_MASTER_URI": uri}
+        whose, self.environ = _find_master(stack, self.environ, self.environment)
+        uri = self.environ["ROS_MASTER_URI"]
         shown = ", ".join([*programs[:_LISTED], *(["..."] if programs[_LISTED:] else [])])
         print_lines([f"nodes not in Python ({shown}) have {whose} ROS 1 master {uri}"])
+
+
+def _find_master(
+    stack: ExitStack, environ: Mapping[str, str], environment: Environment
+) -> tuple[str, dict[str, str]]:
+    """Return a master for ROS 1's programs: the one that is named and runs, or a new one.
+
+    Args:
+        stack: What closes the new one.
+        environ: Environment variables, which may name one.
+        environment: The settings in them.
+
+    Returns:
+        Whose it is, and the environment variables of the programs.
+    """
+    from rosz.bridges.ros1 import open_master, running_master
+
+    if running_master(environ):
+        return "running", dict(environ)
+    bridge = stack.enter_context(open_master(environment))
+    uri = f"http://127.0.0.1:{bridge.port}"
+    return "this launch's", {"ROS_IP": "127.0.0.1", **environ, "ROS_MASTER_URI": uri}
 
 
 def _anonymous_names() -> Callable[[str], str]:

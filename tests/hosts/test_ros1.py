@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+import shutil
+import signal
 import time
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from bridges.ros1.world import LISTENER, TALKER
+from bridges.ros1.world import LISTENER, TALKER, roscpp
 from network import eventually
 from oracle import PYTHON, is_installed
 
 from hosts.host import Host, HostProgram
 from hosts.scripts import slack
+from hosts.sshd import befriend, install_rosz, serve_ssh
 from hosts.test_faults import AGAIN_BY
 from hosts.world import World
 
@@ -137,3 +140,29 @@ def test_what_is_killed_comes_back(world: World, roscore: bool) -> None:
     pair.talker = pair.talk()
     pair.listener.wait_for(re.compile(r"heard rospy \d$"), _LONG, after=before)
     assert time.monotonic() - began < AGAIN_BY * slack()
+
+
+def test_compiled_nodes_on_another_machine(world: World) -> None:
+    """They are found there, and have a master there."""
+    laptop, robot = world.hosts("laptop", "robot")
+    serve_ssh(robot)
+    befriend(laptop, robot)
+    install_rosz(robot)
+    package = robot.home / "src/course"
+    package.mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>course</name></package>")
+    shutil.copy(roscpp(), package / "partner")
+    laptop.rosz("core", "--listen", "tcp/0.0.0.0:7447").wait_for("started core", _LONG)
+    file = laptop.home / "far.launch"
+    node = '<node pkg="course" type="partner" machine="far" output="screen"'
+    file.write_text(
+        f'<launch><machine name="far" address="robot"/>{node} name="talker" args="talker"/>'
+        f'{node} name="listener" args="listener"/></launch>'
+    )
+    launch = laptop.rosz("launch", str(file))
+    launch.wait_for("remote[robot-0]: nodes not in Python have this launch's ROS 1 master", _LONG)
+    launch.wait_for("heard talker ", _LONG)
+    assert "talker" in laptop.ask("topic", "echo", "-n", "1", "/chatter")
+    launch.send(signal.SIGINT)
+    assert launch.exit_code(_LONG) == 0, launch.output
+    assert not [line for line in robot.processes() if "partner" in line or "--agent" in line]

@@ -7,7 +7,7 @@ those that start-up needs alone.
 
 from rosz.launch.run.command import Command, Workplace, run_command
 from rosz.launch.run.control import LaunchStatus, NodeStatus, StatusClient
-from rosz.launch.run.host import Child, Host, ProcessSpec
+from rosz.launch.run.host import Child, Host, ProcessSpec, is_local
 from rosz.launch.run.loop import interrupted_by_signals
 from rosz.launch.run.machines import MachineOption
 from rosz.launch.run.network import (
@@ -43,6 +43,7 @@ __all__ = (
     "core_params",
     "describe_plan",
     "interrupted_by_signals",
+    "is_local",
     "needs_router",
     "run_command",
     "write_params",

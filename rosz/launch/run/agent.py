@@ -11,7 +11,7 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ import msgspec
 
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, RoszError
+from rosz.launch.plan import NodePlan
 from rosz.launch.run.command import Workplace
 from rosz.launch.run.host import Child, LocalHost
 from rosz.launch.run.loop import Loop, Timer
@@ -47,7 +48,12 @@ from rosz.launch.run.protocol import (
 )
 from rosz.session import first_listening, is_listening
 
-__all__ = ("serve",)
+__all__ = ("FindMaster", "serve")
+
+FindMaster = Callable[[Mapping[str, str], Environment], tuple[str, dict[str, str]]]
+"""Function that finds a master of ROS 1 by environment variables, and the settings in them.
+
+It returns whose master it is, and the environment variables of the programs that have it."""
 
 _CHECK_INTERVAL = 0.02
 _SETUP_TIMEOUT = 60.0
@@ -63,6 +69,7 @@ class _Agent:
         reports: Descriptor for reports to the launch.
         screens: Standard output (1) or error (2) of nodes, by the descriptor to read it from.
         environ: Environment variables of this process.
+        find_master: Function that finds a master for programs that may speak ROS 1's protocol.
     """
 
     def __init__(
@@ -71,12 +78,16 @@ class _Agent:
         reports: int,
         screens: Mapping[int, int],
         environ: dict[str, str],
+        find_master: FindMaster,
     ) -> None:
         self._loop = Loop()
         self._requests = requests
         self._writer = MessageWriter(reports)
         self._screens = screens
         self._environ = environ
+        self._find_master = find_master
+        self._workplace: Workplace | None = None
+        self._has_master = False
         self._decoder = msgspec.json.Decoder(Request)
         self._setup: Setup | None = None
         self._output: Output | None = None
@@ -159,13 +170,13 @@ class _Agent:
         self._output = Output(
             self._loop, lambda text: self._writer.send(AgentWarning(text)), setup.tag
         )
-        workplace = Workplace(
+        self._workplace = Workplace(
             package_index(environment), environment, self._environ, str(Path.cwd())
         )
         self._host = LocalHost(
             self._loop,
             self._output,
-            workplace,
+            self._workplace,
             folder=self._make_folder(RunFolder(environment.log_dir, setup.run_id)),
             tag=setup.tag,
             prefixed=setup.prefixed,
@@ -189,12 +200,24 @@ class _Agent:
             self._check_gone(serial)
 
         try:
+            self._give_master(request.job.node)
             child = self._host.start(request.job, exited)
         except RoszError as error:
             self._writer.send(Refused(serial, str(error)))
             return
         self._children[serial] = child
         self._writer.send(Started(serial, child.pid, child.shown, child.logs))
+
+    def _give_master(self, node: NodePlan) -> None:
+        """Have a master of ROS 1 here before the first node starts that may need it."""
+        workplace = self._workplace
+        if workplace is None or self._has_master or not workplace.may_need_master(node):
+            return
+        whose, found = self._find_master(self._environ, workplace.environment)
+        self._environ.update(found)  # the workplace has it, too
+        self._has_master = True
+        uri = found["ROS_MASTER_URI"]
+        self._writer.send(AgentWarning(f"nodes not in Python have {whose} ROS 1 master {uri}"))
 
     def _check_gone(self, serial: int) -> None:
         """Report when a process and all its descendants have ended."""
@@ -261,8 +284,12 @@ def _find_launch(environment: Environment, setup: Setup, connection: str) -> str
     return first_listening(meet, _CONNECT_TIMEOUT) if meet else ""
 
 
-def serve() -> None:
-    """Run the agent of the launch at the other end of standard input and output."""
+def serve(find_master: FindMaster) -> None:
+    """Run the agent of the launch at the other end of standard input and output.
+
+    Args:
+        find_master: Function that finds a master for programs that may speak ROS 1's protocol.
+    """
     requests, reports = os.dup(0), os.dup(1)
     screens = {}
     nothing = os.open(os.devnull, os.O_RDONLY)
@@ -277,4 +304,4 @@ def serve() -> None:
         os.dup2(theirs, sink)
         os.close(theirs)
         screens[ours] = sink
-    _Agent(LineReader(requests), reports, screens, dict(os.environ)).run()
+    _Agent(LineReader(requests), reports, screens, dict(os.environ), find_master).run()

@@ -163,11 +163,11 @@ class Workplace(msgspec.Struct, frozen=True):
         return str(locate(self.packages.find(package), executable))
 
     def may_need_master(self, node: NodePlan) -> bool:
-        """Return whether a node of this machine may speak ROS 1's protocol: it is no Python script.
+        """Return whether a node may speak ROS 1's protocol, if it runs on this machine.
 
-        It is compiled, or a script of a shell that starts others.
+        Then it is no Python script, but compiled, or a script of a shell that starts others.
         """
-        if node.machine or node.command:
+        if node.command:
             return False
         try:
             return not is_python(Path(self.find(node.package, node.type)))

@@ -21,7 +21,8 @@ from .world import LISTENER, roscpp
 pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
 
 _LAUNCH = """<launch>
-  <node pkg="course" type="partner" name="talker" args="talker" respawn="true"/>
+  <machine name="here" address="localhost"/>
+  <node pkg="course" type="partner" name="talker" machine="here" args="talker" respawn="true"/>
   <node pkg="course" type="listener.py" name="listener" args="x chatter" output="screen"/>
   <node pkg="course" type="compiled" name="compiled" output="screen"/>
   <node pkg="course" type="scripted" name="scripted" output="screen"/>
