@@ -30,14 +30,17 @@ class Followed:
     Args:
         interests: The interests of the graph.
         keys: The key expressions, each with the name that the tokens must have, or none.
+        many: Whether hundreds of tokens may match each of them.
 
     Raises:
         ClosedError: The graph or its session is closed.
     """
 
-    def __init__(self, interests: Interests, keys: Iterable[tuple[str, str]]) -> None:
+    def __init__(
+        self, interests: Interests, keys: Iterable[tuple[str, str]], *, many: bool = False
+    ) -> None:
         self._all = interests
-        self._interests: tuple[Interest, ...] = tuple(interests.acquire(keys))
+        self._interests: tuple[Interest, ...] = tuple(interests.acquire(keys, many=many))
         self._known: tuple[int, View] | None = None
         self._closed = False
 

@@ -77,7 +77,7 @@ class Graph:
         Raises:
             ClosedError: The graph or its session is closed.
         """
-        return self.follow(*self._all_keys())
+        return Followed(self._interests, ((key, "") for key in self._all_keys()), many=True)
 
     def view(self) -> View:
         """Return all that is known at this moment, and follow the whole domain from now on.

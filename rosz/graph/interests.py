@@ -112,11 +112,12 @@ class Interests:
         with self.changed:
             return list(self._interests.values())
 
-    def acquire(self, keys: Iterable[tuple[str, str]]) -> list[Interest]:
+    def acquire(self, keys: Iterable[tuple[str, str]], *, many: bool) -> list[Interest]:
         """Follow what matches some key expressions, until `release`.
 
         Args:
             keys: The key expressions, each with the name that the tokens must have, or none.
+            many: Whether hundreds of tokens may match each of them.
 
         Raises:
             ClosedError: The graph or its session is closed.
@@ -124,7 +125,7 @@ class Interests:
         self._lifecycle.check_open("follow anything more")
         interests: list[Interest] = []
         try:
-            interests.extend(self._acquire(*key) for key in keys)
+            interests.extend(self._acquire(*key, many) for key in keys)
         except BaseException:
             self.release(interests)
             raise
@@ -133,7 +134,7 @@ class Interests:
     def draw_on(self, whole: Iterable[Interest]) -> None:
         """Take the tokens of single names from what is followed for good from now on.
 
-        A watch costs a thread, which wakes ten times a second.
+        A watch costs two threads.
 
         Args:
             whole: Interests in the whole domain, which are never released.
@@ -223,7 +224,7 @@ class Interests:
             if interest.watch is not None:
                 interest.watch.close()
 
-    def _acquire(self, key: str, name: str) -> Interest:
+    def _acquire(self, key: str, name: str, many: bool) -> Interest:
         with self.changed:
             interest = self._interests.get(key)
             if interest is not None:
@@ -241,6 +242,7 @@ class Interests:
                 key,
                 lambda token, alive: self._events.put((interest, token, alive)),
                 lambda: self._events.put(partial(self._set_complete, interest)),
+                many=many,
             )
         except BaseException:
             self.release([interest])

@@ -87,7 +87,7 @@ def serve_control(node: NodeCore) -> None:
                 threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True)
             )
 
-    queryable = node.keep(context.session.pull_queryable(key))
+    queryable = node.keep(context.session.pull_queryable(key, rare=True))
     Worker(f"rosz-control{node.name}", serve, receive=queryable.receive, threads=_THREADS)
 
 

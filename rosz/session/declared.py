@@ -12,6 +12,7 @@ import zenoh
 
 from rosz.errors import ClosedError, TransportError
 from rosz.session.at_exit import ENDING, leak_at_exit
+from rosz.session.channels import Channel
 from rosz.session.samples import Sample
 from rosz.worker import Worker
 
@@ -20,12 +21,8 @@ __all__ = (
     "Declared",
     "PullSubscriber",
     "RawPublisher",
-    "open_channel",
     "translate_errors",
 )
-
-_CHANNEL_SIZE = 1 << 20
-"""Capacity of a channel: more items than ever arrive before a thread of Python receives them."""
 
 _log = logging.getLogger("rosz.session")
 
@@ -50,20 +47,6 @@ def translate_errors(what: str) -> Iterator[None]:
         if "cancelled" in text:
             raise ClosedError(f"cannot {what}: it was cancelled") from error
         raise TransportError(f"cannot {what}: {text}") from error
-
-
-def open_channel() -> Any:
-    """Return a channel for what arrives, so that Zenoh never waits for Python.
-
-    Each needs a thread to receive from it, since no two declarations share one, which together
-    costs 30 kB and 0.2 ms. A callback would cost less, but hold up its link for as long as others
-    hold Python's lock.
-
-    A callback would run on a thread of Zenoh. To undeclare an advanced publisher, Zenoh waits for
-    its own threads while it holds Python's lock, and the interpreter aborts at its end when a
-    foreign thread asks for that lock.
-    """
-    return zenoh.handlers.FifoChannel(_CHANNEL_SIZE)
 
 
 class Declared:
@@ -146,7 +129,7 @@ class CallbackThread(Declared):
 
     Args:
         what: The name of the declaration in error texts.
-        entity: The object of Zenoh that was declared with `open_channel`.
+        declared: The object of Zenoh, and the channel that it was declared with.
         callback: Function called with each item on the thread; exceptions are logged.
         begin: Function called once on the thread, before it receives the first item.
         idle: Function called on the thread whenever there is no item, before it waits for one.
@@ -155,15 +138,16 @@ class CallbackThread(Declared):
     def __init__(
         self,
         what: str,
-        entity: Any,
+        declared: tuple[Any, Channel],
         callback: Callable[[Any], None],
         begin: Callable[[], None] | None = None,
         idle: Callable[[], None] | None = None,
     ) -> None:
+        entity, channel = declared
         super().__init__(what, entity)
         # The thread must not refer to this object, else it would not be undeclared. The items
         # must not leave this package, not even as arguments: see `rosz.session.at_exit`.
-        recv, try_recv = entity.handler.recv, entity.handler.try_recv
+        recv, try_recv = channel.recv, channel.try_recv
         item: Any = None
 
         def receive() -> bool | None:

@@ -11,7 +11,8 @@ import zenoh
 
 from rosz.errors import TransportError, UsageError
 from rosz.session.at_exit import ENDING, ClosedSession, leak_at_exit
-from rosz.session.declared import Declared, open_channel
+from rosz.session.channels import Channel, open_channel
+from rosz.session.declared import Declared
 from rosz.session.samples import Sample, Stamp, to_timestamp
 
 __all__ = (
@@ -277,9 +278,9 @@ class Query:
 class Queryable(Declared):
     """A declared queryable that keeps its queries until a thread receives them."""
 
-    def __init__(self, key: str, entity: Any) -> None:
+    def __init__(self, key: str, entity: Any, channel: Channel) -> None:
         super().__init__(f"queryable '{key}'", entity)
-        self._recv = entity.handler.recv
+        self._recv = channel.recv
 
     def receive(self) -> Query | None:
         """Wait for a query and return the oldest one; several threads may call this.

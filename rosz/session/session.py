@@ -1,8 +1,6 @@
 """The Zenoh session, which all communication uses.
 
-No Python runs on the threads of Zenoh: what arrives waits in channels of Zenoh, and threads of
-Python receive it from there. Otherwise a link would wait for Python's lock, and a thread of Zenoh
-that asks for that lock while the interpreter ends would abort the process.
+What arrives waits in channels (`rosz.session.channels`), from which threads of Python receive it.
 """
 
 from __future__ import annotations
@@ -11,23 +9,23 @@ import logging
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from functools import cache
+from functools import cache, partial
 from typing import Any, Self, Unpack
 from weakref import WeakValueDictionary
 
 import zenoh
 import zenoh.ext
 
-from rosz.errors import ClosedError, TransportError
+from rosz.errors import ClosedError
 from rosz.lifecycle import Closable, Lifecycle
 from rosz.session.at_exit import ENDING, ClosedSession
+from rosz.session.channels import declare, declare_rare, open_channel
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
     CallbackThread,
     Declared,
     PullSubscriber,
     RawPublisher,
-    open_channel,
     translate_errors,
 )
 from rosz.session.local_peers import LocalPeers, LocalRegistration, direct_endpoint
@@ -47,6 +45,7 @@ from rosz.session.queries import (
     clamp_timeout,
 )
 from rosz.session.samples import HybridClock, Sample, Stamp, to_timestamp
+from rosz.session.token_watch import TokenWatch
 from rosz.session.zenoh_workarounds import (
     close_links,
     close_links_at_once,
@@ -73,38 +72,6 @@ def _runtime() -> Lifecycle:
     They never end, and a forked child does not have them: a session would never be open there.
     """
     return Lifecycle("the network")
-
-
-class _Beginning:
-    """What a watch of tokens is told until it has reported what existed.
-
-    Seen with eclipse-zenoh 1.10.2: a watch that begins while tokens disappear may be told of the
-    end of some of these first, and then that they exist. `tests/interop/test_hostile.py` shows it;
-    it is not reported upstream yet.
-
-    Attributes:
-        seen: All tokens that it was told of.
-        missing: The tokens that a query of that time found.
-    """
-
-    def __init__(self) -> None:
-        self.seen: set[str] = set()
-        self.missing: set[str] = set()
-        self._gone: set[str] = set()
-        self._live: set[str] = set()
-
-    def add(self, token: str, *, alive: bool) -> None:
-        """Note that a token appeared or disappeared."""
-        self.seen.add(token)
-        if alive:
-            self._live.add(token)
-        else:
-            self._live.discard(token)
-            self._gone.add(token)
-
-    def doubtful(self) -> set[str]:
-        """Return the tokens that may have disappeared unnoticed."""
-        return self._live & self._gone
 
 
 class Session:
@@ -261,6 +228,7 @@ class Session:
         history: int = 0,
         recover: bool = False,
         remote_only: bool = False,
+        rare: bool = False,
     ) -> Closable:
         """Declare a subscriber that calls back.
 
@@ -271,9 +239,13 @@ class Session:
             history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
             remote_only: Whether to ignore what this session itself publishes.
+            rare: Whether samples arrive rarely, and may wait; waiting for them costs less then.
         """
-        entity = self._subscribe(key, open_channel(), history, recover, remote_only)
-        return CallbackThread(f"subscriber '{key}'", entity, lambda raw: callback(Sample(raw)))
+        make = declare_rare if rare else declare
+        declared = make(
+            lambda handler: self._subscribe(key, handler, history, recover, remote_only)
+        )
+        return CallbackThread(f"subscriber '{key}'", declared, lambda raw: callback(Sample(raw)))
 
     def pull_subscriber(
         self,
@@ -330,11 +302,11 @@ class Session:
             complete: Whether the replies are all there are; ROS 2 clients query only such.
         """
         with translate_errors(f"serve '{key}'"):
-            entity = self._raw.declare_queryable(key, open_channel(), complete=complete)
-        return CallbackThread(f"queryable '{key}'", entity, lambda raw: callback(Query(raw)))
+            declared = declare_rare(partial(self._raw.declare_queryable, key, complete=complete))
+        return CallbackThread(f"queryable '{key}'", declared, lambda raw: callback(Query(raw)))
 
     def pull_queryable(
-        self, key: str, *, complete: bool = False, remote_only: bool = False
+        self, key: str, *, complete: bool = False, remote_only: bool = False, rare: bool = False
     ) -> Queryable:
         """Declare a queryable that keeps its queries until a thread receives them.
 
@@ -342,10 +314,12 @@ class Session:
             key: The key expression whose queries get replies here.
             complete: Whether the replies are all there are; ROS 2 clients query only such.
             remote_only: Whether to ignore the queries of this session itself.
+            rare: Whether queries arrive rarely; waiting for them costs less then.
         """
+        make = declare_rare if rare else declare
         options: Any = {"complete": complete, "allowed_origin": _ORIGIN[remote_only]}
         with translate_errors(f"serve '{key}'"):
-            return Queryable(key, self._raw.declare_queryable(key, open_channel(), **options))
+            return Queryable(key, *make(partial(self._raw.declare_queryable, key, **options)))
 
     def token(self, key: str) -> Closable:
         """Declare a liveliness token, which others see until it is closed or the link ends."""
@@ -359,6 +333,8 @@ class Session:
         key: str,
         callback: Callable[[str, bool], None],
         complete: Callable[[], None] | None = None,
+        *,
+        many: bool = False,
     ) -> Closable:
         """Watch liveliness tokens, beginning with those that exist already.
 
@@ -368,53 +344,21 @@ class Session:
                 whether it appeared (true) or disappeared (false).
             complete: Function called there once the tokens that existed at the beginning have
                 been reported.
+            many: Whether hundreds of tokens may come at once; watching costs more then.
         """
-        existing: Replies | None = None
-        beginning = _Beginning()
-
-        def begin() -> None:
-            nonlocal existing
-            if existing is not None:
-                replies, existing = existing, None
-                beginning.missing = {reply.key for reply in replies if reply.ok}
-                del replies
-
-        def idle() -> None:
-            nonlocal complete
-            report = complete
-            if report is not None and beginning.missing <= beginning.seen:
-                for token in self._vanished(key, beginning.doubtful()):
-                    callback(token, False)
-                complete = None
-                report()
-
-        def deliver(raw: zenoh.Sample) -> None:
-            token, alive = str(raw.key_expr), raw.kind == zenoh.SampleKind.PUT
-            if complete is not None:
-                beginning.add(token, alive=alive)
-            own = self._tokens.get(token)
-            # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
-            if alive or own is None or own.closed:
-                callback(token, alive)
-
+        watch = TokenWatch(callback, self._tokens, lambda: self.live_tokens(key, _TOKENS_SECONDS))
+        make = declare if many else declare_rare
         with translate_errors(f"watch tokens '{key}'"):
             liveliness = self._raw.liveliness()
-            entity = liveliness.declare_subscriber(key, open_channel(), history=True)
+            declared = make(partial(liveliness.declare_subscriber, key, history=True))
             if complete is not None:
+                watch.complete = complete
                 # After the watch: when the last reply has come, its channel has what existed, but
                 # for what another watch was told of before, which the replies name.
                 handler = liveliness.get(key, open_channel(), timeout=_TOKENS_SECONDS)
-                existing = Replies(handler)
-        return CallbackThread(f"watch of tokens '{key}'", entity, deliver, begin, idle)
-
-    def _vanished(self, key: str, tokens: set[str]) -> set[str]:
-        """Return those of some tokens that are not alive."""
-        if not tokens:
-            return tokens
-        try:
-            return tokens.difference(self.live_tokens(key, _TOKENS_SECONDS))
-        except (ClosedError, TransportError):
-            return set()  # the watch ends with its session
+                watch.existing = Replies(handler)
+        what = f"watch of tokens '{key}'"
+        return CallbackThread(what, declared, watch.deliver, watch.begin, watch.idle)
 
     def query(
         self,

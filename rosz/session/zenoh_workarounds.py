@@ -41,6 +41,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any, Final
@@ -50,8 +51,9 @@ import zenoh
 
 from rosz.errors import TransportError
 from rosz.lifecycle import Closable
+from rosz.session.channels import declare_rare
 from rosz.session.config import SessionConfig
-from rosz.session.declared import CallbackThread, open_channel
+from rosz.session.declared import CallbackThread
 from rosz.session.local_peers import (
     LocalPeers,
     describe_process,
@@ -246,8 +248,8 @@ class _StoppedPeers:
 
 def close_links_at_once(raw: Any) -> Closable:
     """Return a watch that makes a session close its TCP links at once, now and in the future."""
-    listener = raw.info.declare_link_events_listener(open_channel(), history=True)
-    return CallbackThread("watch of links", listener, _set_no_wait)
+    declared = declare_rare(partial(raw.info.declare_link_events_listener, history=True))
+    return CallbackThread("watch of links", declared, _set_no_wait)
 
 
 def _set_no_wait(event: Any) -> None:

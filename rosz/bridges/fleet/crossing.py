@@ -295,7 +295,8 @@ class _Detection:
     def __init__(self, direction: _Direction, key: str, other: str) -> None:
         self._direction, self._key, self._other = direction, key, other
         self._own: dict[str, Closable] = {}
-        self._watch = direction.source.session.watch_tokens(f"{key}/@adv/pub/**", self._changed)
+        watch = direction.source.session.watch_tokens
+        self._watch = watch(f"{key}/@adv/pub/**", self._changed, many=True)
 
     def _changed(self, token: str, alive: bool) -> None:
         direction = self._direction

@@ -210,10 +210,10 @@ class WriteBroadcaster:
         self._lock = threading.RLock()
         resent_key = keys.of(session.zid, "write")
         self._declared: list[Closable] = [
-            session.subscriber(keys.change, self._on_change, remote_only=True),
-            session.subscriber(
-                f"{keys.scoped_change(session.zid)}/**", self._on_change, remote_only=True
-            ),
+            session.subscriber(key, self._on_change, remote_only=True, rare=True)
+            for key in (keys.change, f"{keys.scoped_change(session.zid)}/**")
+        ]
+        self._declared += [
             session.queryable(f"{resent_key}/**", self._on_resent, complete=True),
         ]
 

@@ -134,7 +134,7 @@ class Members:
                 complete.set()
                 self._count()
 
-        return self._session.watch_tokens(self._keys.tokens, on_token, on_complete)
+        return self._session.watch_tokens(self._keys.tokens, on_token, on_complete, many=True)
 
     def _on_elder_token(self, token: str, alive: bool) -> None:
         self._update(self._elders, token, alive, self._on_elder)
