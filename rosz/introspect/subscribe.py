@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosz import names
@@ -66,11 +67,12 @@ def wait_for_target(context: Context, name: str, warn: Callable[[str], object]) 
         ClosedError: The context is shut down meanwhile.
     """
     load = context.types.message
-    try:
+    with suppress(NotFoundError):
         return find_target(name, topic_types(context.graph.refresh()), load)
+    try:  # on a busy machine, the query may have ended before all have replied
+        return find_target(name, topic_types(context.graph.view()), load)
     except NotFoundError as error:
         warn(f"topic [{name}] does not appear to be published yet ({error})")
-    context.graph.view()  # from now on, later looks know what this one finds
     found: list[Target] = []
 
     def look(view: View) -> bool:
