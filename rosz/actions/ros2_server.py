@@ -77,6 +77,14 @@ class Ros2Server(NativeServer):
         self._receive_cancel(GoalID(id=str(goal.id)))
         return True
 
+    def cancel_others(self, until: int) -> None:
+        """Let the server know that a client wants goals to end, also those of actionlib's clients.
+
+        Args:
+            until: Time in nanoseconds until which they were sent; 0 for all goals.
+        """
+        self._receive_cancel(GoalID(stamp=Time.from_nsec(until)))
+
     def update(self, status: GoalStatus, result: Any) -> None:
         """Let the client of a goal know of its state.
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ("ActionServer", "Policy", "ServerGoal")
 
 Policy = Literal["parallel", "queue", "preempt"]
-"""What becomes of a goal that arrives while another one is executed: see `rosz.Node`."""
+"""How a goal that arrives while another one is executed is treated: see `rosz.Node`."""
 
 _POLICIES = ("parallel", "queue", "preempt")
 _MOST_AT_ONCE = 128
@@ -279,6 +279,8 @@ class ActionServer:
                 for one in self._goals.values()
                 if not one.done and (everything or one is named or 0 < one.accepted <= stamp)
             ]
+        if goal_id == _NO_GOAL:
+            self.cancel_others(stamp)
         cancelled = [one for one in wanted if self.allows_cancel(one)]
         cancelled = [one for one in cancelled if self.begin_cancel(one)]
         if wanted and not cancelled:
@@ -300,6 +302,13 @@ class ActionServer:
         except (Exception, SystemExit) as error:  # noqa: BLE001  # the callback boundary
             self._node.log.report(f"the cancel callback of action '{self.name}' failed", error)
             return False
+
+    def cancel_others(self, until: int) -> None:
+        """Ask goals to end that clients of another protocol have sent; here there are none.
+
+        Args:
+            until: Time in nanoseconds until which they were sent; 0 for all goals.
+        """
 
     def begin_cancel(self, goal: ServerGoal) -> bool:
         """Ask a goal to end; return whether it does, and has not ended otherwise."""

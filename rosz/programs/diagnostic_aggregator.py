@@ -96,7 +96,7 @@ def _without_prefix(path: str, prefix: str) -> str:
 
 
 class Analyzer(Protocol):
-    """What takes some statuses, and reports them below its path.
+    """Takes some statuses, and reports them below its path.
 
     Attributes:
         path: Path of what it reports.

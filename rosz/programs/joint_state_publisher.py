@@ -66,8 +66,8 @@ class Mimic(msgspec.Struct, frozen=True):
 
     Attributes:
         parent: The other joint.
-        factor: What its position and velocity are multiplied by.
-        offset: What is added to its position.
+        factor: Factor of its position and velocity.
+        offset: Number added to its position, in radians or metres.
     """
 
     parent: str

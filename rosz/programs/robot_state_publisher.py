@@ -53,8 +53,8 @@ class Link(msgspec.Struct, frozen=True):
         origin: Pose of the joint in the parent.
         axis: Axis of the motion, of length 1.
         mimics: Joint that this one follows; empty for none.
-        factor: What the position of that joint is multiplied by.
-        offset: What is added then.
+        factor: Factor of the position of that joint.
+        offset: Number added then, in radians or metres.
     """
 
     parent: str

@@ -1,4 +1,4 @@
-"""What is published about each frame: by whom, how often and how late."""
+"""Statistics of the transforms of each frame: who publishes it, how often and how late."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ from rosz.introspect.topics import list_topics
 from rosz.msgs.action_msgs.msg import GoalInfo
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
 from rosz.msgs.actionlib_tutorials.action import Fibonacci
+from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
 from rosz.node.goals import GoalState
 
@@ -211,6 +212,50 @@ def test_a_client_of_ros2_cancels_goals_of_actionlib(world: World) -> None:
         assert sent.wait(TIMEOUT) is GoalState.CANCELED
     assert first.status.status == GoalStatus.RECALLED
     assert second.status.status == GoalStatus.PREEMPTED
+
+
+@pytest.mark.parametrize("everything", [True, False])
+def test_a_client_of_ros2_cancels_many_goals(world: World, everything: bool) -> None:
+    """All goals of a server, or those sent until a time, whichever protocol they came by."""
+    world.ros1_server(on_cancel=lambda goal: goal.cancel())
+    one, other = world.ros1_client(), world.ros2_client()
+    early = one.send(world.goal(1)), other.send(Fibonacci.Goal(2))
+    for _ in early:
+        world.next().accept()
+    until = world.one.now()
+    late = one.send(world.goal(3)), other.send(Fibonacci.Goal(4))
+    arrived = [world.next() for _ in late]
+    for goal in arrived:
+        goal.accept()
+    assert other.cancel_all(0 if everything else until) == (2 if everything else 1)
+    for first, second in (early, late) if everything else (early,):
+        assert first.wait(TIMEOUT)
+        assert first.status.status == GoalStatus.PREEMPTED
+        assert second.wait(TIMEOUT) is GoalState.CANCELED
+    if not everything:
+        assert not any(goal.done for goal in late)
+        for goal in arrived:
+            goal.succeed(world.result())
+        assert late[0].wait(TIMEOUT)
+        assert late[1].wait(TIMEOUT) is GoalState.SUCCEEDED
+
+
+@pytest.mark.parametrize("everything", [True, False])
+def test_a_client_of_actionlib_cancels_many_goals(world: World, everything: bool) -> None:
+    world.ros1_server(on_cancel=lambda goal: goal.cancel())
+    one, other = world.ros1_client(), world.ros2_client()
+    early = other.send(Fibonacci.Goal(2))
+    world.next().accept()
+    until = Time.from_nsec(world.one.now())
+    late = other.send(Fibonacci.Goal(4))
+    arrived = world.next()
+    arrived.accept()
+    one.publish_cancel(GoalID() if everything else GoalID(stamp=until))
+    assert early.wait(TIMEOUT) is GoalState.CANCELED
+    if not everything:
+        assert not late.done
+        arrived.succeed(world.result())
+    assert late.wait(TIMEOUT) is (GoalState.CANCELED if everything else GoalState.SUCCEEDED)
 
 
 def test_a_goal_may_end_in_the_callback_that_cancels_it(world: World) -> None:
