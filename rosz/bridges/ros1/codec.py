@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from rosz.bridges.logs import LOGS, to_ros1_log, to_ros2_log
 from rosz.errors import TypeNotFound
 from rosz.message.transcode import compile_from_cdr, compile_transcoder
 from rosz.qos import ROSOUT, QoS
@@ -24,9 +25,6 @@ __all__ = ("Codec", "Codecs")
 
 _LOG = "rosgraph_msgs/Log"
 _LOG_OF_ROS2 = "rcl_interfaces/Log"
-_ROSOUT = "/rosout"
-_LEVELS = ((10, 1), (20, 2), (30, 4), (40, 8), (50, 16))
-"""Levels of ROS 2 and ROS 1, by severity."""
 
 
 class Codec(msgspec.Struct, frozen=True):
@@ -85,7 +83,7 @@ class Codecs:
                 cls = self._types.message_from_text(type_name, definition)
             else:
                 cls = self._types.message(type_name)
-            if (topic, cls._type) == (_ROSOUT, _LOG):
+            if (topic, cls._type) == (LOGS, _LOG):
                 return self._make(cls, self._types.message(_LOG_OF_ROS2))
             return self._make(cls, cls)
 
@@ -105,7 +103,7 @@ class Codecs:
             cls = self._types.message(type_name)
             if type_hash.startswith("RIHS01_") and type_hash != cls._type_hash:
                 raise TypeNotFound(type_name, "its definition there is not the one known here")
-            if (topic, cls._type) == (_ROSOUT, _LOG_OF_ROS2):
+            if (topic, cls._type) == (LOGS, _LOG_OF_ROS2):
                 return self._make(self._types.message(_LOG), cls)
             return self._make(cls, cls)
 
@@ -141,31 +139,13 @@ def _log_codecs(
     ros1: type[Any], network: type[Any]
 ) -> tuple[Callable[[Any], bytes], Callable[[bytes, bytes], list[Any]]]:
     """Return the codecs between ROS 1's and ROS 2's messages of ``/rosout``."""
-    to_network = {old: new for new, old in _LEVELS}
 
     def to_cdr(data: Any) -> bytes:
-        log = ros1.from_ros1(data)
-        made: bytes = network(
-            log.header.stamp,
-            to_network.get(log.level, _LEVELS[1][0]),
-            log.name,
-            log.msg,
-            log.file,
-            log.function,
-            log.line,
-        ).to_cdr()
-        return made
+        return to_ros2_log(ros1.from_ros1(data)).to_cdr()
 
     def from_cdr(data: bytes, seq: bytes) -> list[Any]:
-        log = network.from_cdr(data)
-        message = ros1()
+        message = to_ros1_log(network.from_cdr(data))
         message.header.seq = int.from_bytes(seq, "little")
-        message.header.stamp = log.stamp
-        message.level = next((old for new, old in reversed(_LEVELS) if log.level >= new), 1)
-        # A logger that has the name of its node comes without the first slash from ROS 2.
-        message.name = log.name if log.name.startswith("/") else f"/{log.name.replace('.', '/')}"
-        message.msg, message.file = log.msg, log.file
-        message.function, message.line = log.function, log.line
         return [message.to_ros1()]
 
     return to_cdr, from_cdr

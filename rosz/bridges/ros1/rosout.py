@@ -8,17 +8,12 @@ from __future__ import annotations
 
 from functools import partial
 
+from rosz.bridges.logs import GATHERED, LOGS
 from rosz.node import Context
 from rosz.qos import for_queue
 from rosz.wire import Kind, Token
 
-__all__ = ("GATHERED", "LOGS", "log_tokens")
-
-LOGS = "/rosout"
-"""The topic that nodes log to, and the name of the node."""
-
-GATHERED = "/rosout_agg"
-"""The topic with the logs of all nodes."""
+__all__ = ("log_tokens",)
 
 _QUEUE = 1000
 

@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import msgspec
 
+from rosz.bridges.logs import GATHERED, LOGS
 from rosz.bridges.ros1.codec import Codecs
-from rosz.bridges.ros1.rosout import GATHERED, LOGS, log_tokens
+from rosz.bridges.ros1.rosout import log_tokens
 from rosz.bridges.ros1.sockets import SocketLoop, log
 from rosz.lifecycle import Lifecycle
 from rosz.names import is_of_action

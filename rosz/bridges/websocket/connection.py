@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from rosz.bridges.logs import is_log, to_ros2_log
 from rosz.bridges.websocket import operations as ops
 from rosz.bridges.websocket.actions import Gateways, SentGoals, ServedActions
 from rosz.bridges.websocket.messages import build_from_json
@@ -19,6 +20,7 @@ from rosz.bridges.websocket.outbox import Feed, Outbox
 from rosz.bridges.websocket.plain import Spelling
 from rosz.bridges.websocket.services import Calls, ServedServices
 from rosz.errors import RoszError, UsageError
+from rosz.msgs.rosgraph_msgs.msg import Log
 
 if TYPE_CHECKING:
     from rosz.bridges.gate import Gate
@@ -275,6 +277,10 @@ class Connection:
         publisher = self._publishers[topic]
         self._shared.gateways.want(topic, publisher.message_type, self)
         now = self._shared.node.now()
+        if self._spelling == "ros1" and is_log(topic, publisher.message_type):
+            log = build_from_json(Log, operation.msg, self._spelling, now)
+            publisher.publish(to_ros2_log(log))
+            return
         cls = publisher.message_type
         publisher.publish(build_from_json(cls, operation.msg, self._spelling, now))
 

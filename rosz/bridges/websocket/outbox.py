@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 
 import msgspec
 
+from rosz.bridges.logs import is_log, to_ros1_log
 from rosz.bridges.websocket.operations import Compression, Subscribe
 from rosz.bridges.websocket.plain import Spelling, converter
 
@@ -109,12 +110,12 @@ class Message:
     def _encode(self, compression: Compression, spelling: Spelling) -> bytes:
         if compression == "cbor-raw":
             return self._cbor(self._raw(spelling))
-        message = self._cls.from_cdr(self.data)
+        message = self._message(spelling)
         if compression == "cbor":
             from cbor2 import CBORTag
 
-            return self._cbor(converter(self._cls, spelling, CBORTag)(message))
-        plain = converter(self._cls, spelling)(message)
+            return self._cbor(converter(type(message), spelling, CBORTag)(message))
+        plain = converter(type(message), spelling)(message)
         return msgspec.json.encode({"op": "publish", "topic": self._topic, "msg": plain})
 
     def _raw(self, spelling: Spelling) -> dict[str, Any]:
@@ -127,8 +128,14 @@ class Message:
                 "nsecs": rest,
                 "bytes": self.data,
             }
-        data = self._cls.from_cdr(self.data).to_ros1()
+        data = self._message(spelling).to_ros1()
         return {"secs": seconds, "nsecs": rest, "bytes": data}
+
+    def _message(self, spelling: Spelling) -> Any:
+        message = self._cls.from_cdr(self.data)
+        if spelling == "ros1" and is_log(self._topic, self._cls):
+            return to_ros1_log(message)
+        return message
 
     def _cbor(self, message: dict[str, Any]) -> bytes:
         import cbor2

@@ -23,7 +23,7 @@ from rosz.message.convert import shown_name
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.rosapi import srv
 from rosz.msgs.rosapi.msg import TypeDef
-from rosz.names import short_type
+from rosz.names import ros1_type, short_type
 from rosz.node.goals import SEND
 from rosz.wire import Kind
 
@@ -136,7 +136,7 @@ class _Answers:
     def _typed_topics(self) -> dict[str, str]:
         known = self._view().topics()
         return {
-            name: _spelt(types[0], self._spelling)
+            name: _spelt_topic(name, types[0], self._spelling)
             for name, types in sorted(known.items())
             if self._gate.shows("topics", name) and "/_action/" not in name
         }
@@ -312,6 +312,10 @@ def _spelt(type_name: str, spelling: Spelling) -> str:
         return short_type(type_name) if spelling == "ros1" else type_name
     package, _, name = type_name.partition("/")
     return f"{package}/msg/{name}"
+
+
+def _spelt_topic(topic: str, type_name: str, spelling: Spelling) -> str:
+    return ros1_type(topic, type_name) if spelling == "ros1" else _spelt(type_name, spelling)
 
 
 def _nodes_of(tokens: Iterable[Any]) -> list[str]:

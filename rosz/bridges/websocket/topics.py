@@ -7,8 +7,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rosz.bridges.logs import GATHERED, LOGS
 from rosz.bridges.websocket.outbox import Encodings, Feed, Message
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
+from rosz.msgs.rcl_interfaces.msg import Log as Ros2Log
+from rosz.msgs.rosgraph_msgs.msg import Log as Ros1Log
 from rosz.names import short_type
 from rosz.node import MessageInfo
 from rosz.node.type_description import request_type
@@ -49,6 +52,8 @@ class Topics:
             DefinitionError: Its definition is not well-formed.
         """
         wanted = short_type(type_name)
+        if topic in (LOGS, GATHERED) and wanted == Ros1Log._type:
+            wanted = Ros2Log._type
         view = self._node.context.graph.refresh()
         tokens = [*view.publishers(topic), *view.subscriptions(topic)]
         types = sorted({short_type(token.type_name) for token in tokens})
@@ -149,7 +154,12 @@ class _Source:
         self._lock = threading.RLock()
         with self._lock:  # a message may come before the subscription is assigned
             self._subscription: Subscription[Any] = node.subscription(
-                topic, cls, self._receive, queue_size=100, raw=True, with_info=True
+                LOGS if topic == GATHERED else topic,
+                cls,
+                self._receive,
+                queue_size=100,
+                raw=True,
+                with_info=True,
             )
 
     def add(self, feed: Feed, offer: Offer) -> None:

@@ -75,28 +75,32 @@ def bridge_on(network: Network, **options: Any) -> Iterator[Bridge]:
 
 
 class Doubling:
-    """What a server does: it doubles positive numbers, and waits for the end of others."""
+    """Servers that double positive numbers, and give feedback about others until they are canceled.
+
+    ``/native`` is one of ROS 2, ``/classic`` one of ROS 1.
+    """
 
     def __init__(self, node: Node) -> None:
         node.action_server("native", Test, self._execute_native)
-        self._classic = SimpleActionServer(
-            ActionServer(node, "classic", node.context.types.message("actionlib/TestAction")),
-            self._execute,
-        )
+        action = node.context.types.message("actionlib/TestAction")
+        self._classic = SimpleActionServer(ActionServer(node, "classic", action), self._execute)
         self._classic.start()
 
     def _execute_native(self, goal: Any) -> None:
-        if goal.request.goal < 0:
-            goal.wait_for_cancel(TIMEOUT)
-            goal.canceled(Test.Result(5))
+        if goal.request.goal >= 0:
+            goal.succeed(Test.Result(2 * goal.request.goal))
             return
-        goal.feedback(Test.Feedback(7))
-        goal.succeed(Test.Result(2 * goal.request.goal))
+        while not goal.wait_for_cancel(0.05):
+            goal.feedback(Test.Feedback(7))
+        goal.canceled(Test.Result(5))
 
     def _execute(self, goal: Any) -> None:
-        if goal.goal < 0:
-            eventually(self._classic.is_preempt_requested, "the request to end")
-            self._classic.set_preempted(Test.Result(5))
+        def look() -> bool:
+            self._classic.publish_feedback(Test.Feedback(7))
+            return self._classic.is_preempt_requested()
+
+        if goal.goal >= 0:
+            self._classic.set_succeeded(Test.Result(2 * goal.goal))
             return
-        self._classic.publish_feedback(Test.Feedback(7))
-        self._classic.set_succeeded(Test.Result(2 * goal.goal))
+        eventually(look, "the request to end")
+        self._classic.set_preempted(Test.Result(5))

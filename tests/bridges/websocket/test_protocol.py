@@ -26,6 +26,7 @@ from rosz.bridges.websocket import Limits
 from rosz.errors import ActionError
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import PoseStamped
+from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, LaserScan
 from rosz.msgs.std_msgs.msg import Float64, Header, Int32, String
 from rosz.msgs.std_srvs.srv import SetBool
@@ -184,6 +185,41 @@ def test_several_subscriptions_of_a_topic(bridge: Bridge, client: Client) -> Non
     assert cbor2.loads(client.receive())["msg"]["data"] == 2
     client.send("unsubscribe", topic="/count", id="b")
     eventually(lambda: not publisher.subscribers(), "the end of the subscription")
+
+
+def test_logs(bridge: Bridge, client: Client) -> None:
+    """``/rosout`` has the type of the client's ROS, in both directions."""
+    node = bridge.network.node("talker")
+    heard: SimpleQueue[Log] = SimpleQueue()
+    node.subscription("/rosout", Log, heard.put)
+    for topic in ("/rosout", "/rosout_agg"):
+        client.send("subscribe", topic=topic, type="rosgraph_msgs/Log")
+        client.sync()
+        eventually(
+            lambda: node.context.graph.refresh().subscriptions("/rosout")[1:], "two listeners"
+        )
+        node.log.warning("look out %s", topic)
+        got = client.receive()
+        while "look out" not in got["msg"]["msg"]:
+            got = client.receive()
+        assert (got["topic"], got["msg"]["level"], got["msg"]["name"]) == (topic, 4, "/talker")
+        assert got["msg"]["header"]["stamp"]["secs"] > 0
+        client.send("unsubscribe", topic=topic)
+    client.send("call_service", service="/rosapi/topic_type", args={"topic": "/rosout"})
+    assert client.receive_op("service_response")["values"]["type"] == "rosgraph_msgs/Log"
+    client.send("advertise", topic="/rosout", type="rosgraph_msgs/Log")
+    client.send("publish", topic="/rosout", msg={"level": 8, "msg": "from a page", "name": "/page"})
+    log = heard.get(timeout=TIMEOUT)
+    while log.name != "/page":
+        log = heard.get(timeout=TIMEOUT)
+    assert (log.level, log.msg) == (Log.ERROR, "from a page")
+    client.send("subscribe", topic="/rosout", type="rcl_interfaces/msg/Log")
+    client.sync()
+    node.log.error("again")
+    got = client.receive()
+    while got["msg"]["msg"] != "again":
+        got = client.receive()
+    assert (got["msg"]["level"], "stamp" in got["msg"]) == (40, True)
 
 
 def test_several_advertisements_of_a_topic(bridge: Bridge, client: Client) -> None:
