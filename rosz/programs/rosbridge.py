@@ -20,10 +20,11 @@ def serve_websocket() -> None:
     """Serve the rosbridge protocol as the parameters of the node say, until the node ends.
 
     The parameters have the names of rosbridge_suite: ``~port``, ``~address``, ``~certfile``,
-    ``~keyfile``, ``~websocket_null_origin``, ``~topics_glob``, ``~services_glob``,
-    ``~params_glob``. Those of its buffers and threads are ignored. ``~password_file`` names a file
-    whose first line clients must know; without one, a random password is printed if the address is
-    not one of this machine alone.
+    ``~keyfile``, ``~authenticate``, ``~max_message_size``, ``~websocket_null_origin``,
+    ``~topics_glob``, ``~services_glob``, ``~params_glob``. Those of its buffers and threads are
+    ignored. ``~password_file`` names a file whose first line clients must know; without one, a
+    random password is printed if ``~authenticate`` is true, or if the address is not one of this
+    machine alone.
 
     Raises:
         RoszError: A parameter is not valid, or the port is in use.
@@ -35,6 +36,8 @@ def serve_websocket() -> None:
             host="0.0.0.0" if address in _EVERYWHERE else address,  # noqa: S104  # as asked
             port=_port(_get(node, "port", 9090)),
             password_file=str(_get(node, "password_file", "")),
+            authenticate=bool(_get(node, "authenticate", False)),
+            fragment_size=_size(_get(node, "max_message_size", "None")),
             origins=("null",) if _get(node, "websocket_null_origin", True) else (),
             topics=_patterns(node, "topics_glob"),
             services=_patterns(node, "services_glob"),
@@ -82,6 +85,16 @@ def _get(node: Node, name: str, default: Any) -> Any:
 def _port(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise UsageError(f"parameter '~port' is {value!r}: expected a number such as 9090")
+    return value
+
+
+def _size(value: Any) -> int | None:
+    if value in (None, "None", ""):
+        return None
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise UsageError(
+            f"parameter '~max_message_size' is {value!r}: expected a number of characters or 'None'"
+        )
     return value
 
 

@@ -72,6 +72,7 @@ class Connection:
         refuse: Function that ends the connection with a reason.
         trusted: Whether it has shown to know the password.
         limit: Largest size of an operation in parts, and of the calls that have not ended.
+        fragment_size: Largest number of characters of an answer that does not go in parts.
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class Connection:
         *,
         trusted: bool,
         limit: int,
+        fragment_size: int | None = None,
     ) -> None:
         self.trusted: bool = trusted
         self._shared = shared
@@ -90,6 +92,7 @@ class Connection:
         self._name = name
         self._refuse = refuse
         self._limit = limit
+        self._fragment_size = fragment_size
         self._parts = ops.Fragments(limit)
         self._size = 0
         self._pending = 0
@@ -193,8 +196,9 @@ class Connection:
 
     def send(self, value: dict[str, Any], *, fragment_size: float | None = None) -> None:
         """Send an operation."""
-        for text in ops.fragments(msgspec.json.encode(value), fragment_size, next(self._numbers)):
-            self._outbox.put(text)
+        text, size = msgspec.json.encode(value), fragment_size or self._fragment_size
+        for part in ops.fragments(text, size, next(self._numbers)):
+            self._outbox.put(part)
 
     def close(self) -> None:
         """End everything that the client has begun."""

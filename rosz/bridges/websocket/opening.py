@@ -17,7 +17,7 @@ from rosz.bridges.admission import (
 )
 from rosz.bridges.gate import Gate
 from rosz.bridges.websocket.plain import Spelling
-from rosz.bridges.websocket.server import PORT, WebsocketBridge
+from rosz.bridges.websocket.server import PORT, Limits, WebsocketBridge
 from rosz.errors import UsageError
 from rosz.session import keys_of
 
@@ -38,6 +38,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
         host: Address to listen at. Beyond this machine, clients need a password.
         port: Port to listen at; 0 for any.
         password_file: File whose first line is the password; empty for a random one.
+        authenticate: Whether clients need a password also on this machine.
+        fragment_size: Largest number of characters of a text that clients get whole; None for any.
         origins: Origins of pages that may connect without a password.
         read_only: Whether clients change nothing.
         topics: Patterns of the topics that clients see.
@@ -51,6 +53,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     port: int = PORT
     password_file: str = ""
+    authenticate: bool = False
+    fragment_size: int | None = None
     origins: tuple[str, ...] = ()
     read_only: bool = False
     topics: tuple[str, ...] = ()
@@ -81,7 +85,7 @@ def open_bridge(node: Node, settings: Settings) -> tuple[WebsocketBridge, list[s
     password = ""
     if settings.password_file:
         password = read_password(Path(settings.password_file))
-    elif not local:
+    elif settings.authenticate or not local:
         password = new_password()
     rules = keys.rules if keys else None
     bridge = WebsocketBridge(
@@ -98,6 +102,7 @@ def open_bridge(node: Node, settings: Settings) -> tuple[WebsocketBridge, list[s
         admission=Admission(password, settings.origins),
         tls=server_tls(None if local else keys, settings.certificate, settings.key),
         spelling=settings.spelling,
+        limits=Limits(fragment_size=settings.fragment_size),
     )
     return bridge, _describe(bridge, settings, password, secure=bool(keys and not local))
 
@@ -112,7 +117,7 @@ def _describe(
     if password and not settings.password_file:
         address += f"/?token={password}"
     lines = [f"rosbridge clients connect to {address}"]
-    if password and scheme == "ws":
+    if password and scheme == "ws" and not is_loopback(settings.host):
         lines.append(
             "the password is sent unencrypted; keys (ROSZ_KEYS) or --certificate change that"
         )

@@ -59,6 +59,7 @@ class Limits(msgspec.Struct, frozen=True):
         operation: Largest size of an operation that a client sends, in bytes.
         password: Largest size of the first operation of a client that has no password yet.
         password_seconds: Time that such a client has, in seconds.
+        fragment_size: Largest number of characters of a text that clients get whole; None for any.
     """
 
     clients: int = 500
@@ -67,6 +68,7 @@ class Limits(msgspec.Struct, frozen=True):
     operation: int = 64 << 20
     password: int = 4096
     password_seconds: float = 10.0
+    fragment_size: int | None = None
 
 
 class WebsocketBridge:
@@ -204,6 +206,7 @@ class WebsocketBridge:
             refuse,
             trusted=trusted,
             limit=self._limits.operation,
+            fragment_size=self._limits.fragment_size,
         )
 
         def check_trust() -> None:
@@ -261,7 +264,8 @@ class WebsocketBridge:
                 data = png(data)
             if compression.startswith("cbor"):
                 return [data]
-            return list(fragments(data, feed.fragment_size, number))
+            size = feed.fragment_size or self._limits.fragment_size
+            return list(fragments(data, size, number))
 
         try:
             if message.size <= _ENCODED_HERE and feed.form[0] != "png":
