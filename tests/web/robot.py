@@ -18,6 +18,30 @@ import rosz
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_msgs.msg import Float64, String
 from rosz.msgs.std_srvs.srv import SetBool
+from rosz.reconfigure import Choice, Description, Group, Server, Setting, enumeration
+
+SETTINGS = Description(
+    [
+        Setting("speed", 0.5, "How fast it drives", min=0.0, max=2.0),
+        Setting("count", 3, "How often", min=0, max=10),
+        Setting("lights", True, "Whether the lights are on"),
+    ],
+    [
+        Group(
+            "Camera",
+            (
+                Setting("label", "front", "Text in the picture"),
+                Setting("mode", 1, edit_method=enumeration([Choice("slow", 0), Choice("fast", 1)])),
+            ),
+        )
+    ],
+)
+
+
+def reconfigured(config, level):
+    print("speed is", config["speed"], flush=True)
+    return config
+
 
 with rosz.Node("robot") as node:
     chatter = node.publisher("chatter", String)
@@ -27,6 +51,7 @@ with rosz.Node("robot") as node:
     node.params.set("~rate", 20)
     node.params.set("~gains", {"p": 1.5, "names": ["a", "b"], "on": True})
     node.params.watch("~rate", lambda change: print("rate is", change.new, flush=True))
+    server = Server(node, SETTINGS, reconfigured)
     node.timer(1.0, lambda event: node.log.warning("the battery is low"))
     print("ready", flush=True)
     for tick in node.rate(20):

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network, Program, eventually
 
+from rosz.reconfigure import Client
 from rosz.web.pages.layout import ENTRIES
 
 from .robot import ROBOT, THEMES, open_browser, set_screen, take_picture
@@ -120,11 +121,19 @@ SEEN = {
     "/": ("/chatter", "/robot", "std_msgs/String", "Hz"),
     "/graph": ("/chatter", "/robot", "20 Hz"),
     "/topics": ("data", "std_msgs/String", "hello"),
+    "/plot": ("/wave/data", "Pause"),
     "/console": ("the battery is low", "/robot"),
     "/parameters": ("gains", "rate", "1.5"),
+    "/reconfigure": ("speed", "How fast it drives", "Camera", "lights"),
     "/services": ("/enable", "std_srvs/SetBool"),
 }
-QUERY = {"/graph": "?content=all", "/topics": "?topic=/chatter", "/services": "?service=/enable"}
+QUERY = {
+    "/graph": "?content=all",
+    "/plot": "?fields=/wave/data",
+    "/reconfigure": "?server=/robot",
+    "/services": "?service=/enable",
+    "/topics": "?topic=/chatter",
+}
 
 
 @pytest.mark.parametrize("path", [entry.path for entry in ENTRIES])
@@ -160,6 +169,26 @@ def test_what_pages_do_arrives(world: World) -> None:
     world.click("Set")
     world.robot.wait_for("rate is 35", LONG)
     world.should_see("20 → 35")
+    assert world.messages() == []
+
+
+def test_a_slider_reaches_the_node_and_the_node_the_slider(world: World) -> None:
+    set_screen(world.browser, "laptop", "light")
+    world.open("/reconfigure?server=/robot")
+    world.should_see("How fast it drives")
+    from selenium.webdriver import ActionChains
+
+    slider = world.browser.find_element("css selector", ".q-slider")
+
+    def move() -> bool:
+        ActionChains(world.browser).move_to_element(slider).click().perform()
+        return re.search(r"speed is (0\.9|1\.0)", world.robot.output) is not None
+
+    eventually(move, "the slider moves the setting", LONG)
+    with Client(world.network.node("other"), "/robot", timeout=LONG) as client:
+        client.update({"speed": 1.75})
+    value = "return document.querySelector('input[aria-label=speed]').value"
+    eventually(lambda: world.browser.execute_script(value) == "1.75", "1.75 on the page", LONG)
     assert world.messages() == []
 
 

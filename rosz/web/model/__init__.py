@@ -9,6 +9,8 @@ from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
+from rosz.web.model.plotting import Plot, split_fields
+from rosz.web.model.reconfiguring import Reconfiguration
 from rosz.web.model.sending import Sending, form_of
 from rosz.web.model.sharing import Shared
 from rosz.web.model.system import System
@@ -20,6 +22,8 @@ __all__ = (
     "LogBook",
     "Parameters",
     "Permission",
+    "Plot",
+    "Reconfiguration",
     "Sending",
     "Shared",
     "System",
@@ -28,4 +32,5 @@ __all__ = (
     "call_service",
     "form_of",
     "message_tree",
+    "split_fields",
 )

@@ -53,8 +53,10 @@ ENTRIES = (
     Entry("/", "Overview", "space_dashboard"),
     Entry("/graph", "Graph", "hub"),
     Entry("/topics", "Topics", "swap_horiz"),
+    Entry("/plot", "Plot", "show_chart"),
     Entry("/console", "Console", "subject"),
     Entry("/parameters", "Parameters", "tune"),
+    Entry("/reconfigure", "Reconfigure", "settings_input_component"),
     Entry("/services", "Services", "build"),
 )
 """The pages, in the order of the navigation."""
@@ -72,10 +74,11 @@ body.body--dark { background: #12151c; --rosz-line: #2c3340; --rosz-soft: #9aa5b
 .rosz-number { font-variant-numeric: tabular-nums; }
 .q-table th { color: var(--rosz-soft); font-weight: 600; }
 .rosz-nav.q-item { border-radius: 8px; margin: 2px 8px; min-height: 40px; }
-.rosz-nav { color: inherit; }
+body .rosz-nav.q-item { color: inherit; }
+.q-drawer { background: var(--rosz-card) !important; }
 body.body--dark .q-btn.text-primary, body.body--dark .q-icon.text-primary {
-  color: #9dbcff !important; }
-.rosz-nav.rosz-here { background: #2456c81c; color: #2456c8; font-weight: 600; }
+  --q-primary: #9dbcff; }
+body .rosz-nav.rosz-here { background: #2456c81c; color: #2456c8; font-weight: 600; }
 body.body--dark .rosz-nav.rosz-here { background: #6b9bff26; color: #9dbcff; }
 a { color: #2456c8; } body.body--dark a { color: #9dbcff; }
 :focus-visible { outline: 2px solid #6b9bff; outline-offset: 1px; }

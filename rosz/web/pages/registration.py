@@ -9,6 +9,8 @@ from rosz.web.pages.console import show_console
 from rosz.web.pages.graph import show_graph
 from rosz.web.pages.overview import show_overview
 from rosz.web.pages.parameters import show_parameters
+from rosz.web.pages.plot import show_plot
+from rosz.web.pages.reconfigure import show_reconfigure
 from rosz.web.pages.services import show_services
 from rosz.web.pages.topics import show_topics
 
@@ -37,6 +39,14 @@ def add_pages(system: System) -> None:
     @ui.page("/parameters")
     def parameters(prefix: str = "") -> None:
         show_parameters(system, prefix)
+
+    @ui.page("/plot")
+    def plot(fields: str = "", window: int = 10) -> None:
+        show_plot(system, fields, window)
+
+    @ui.page("/reconfigure")
+    def reconfigure(server: str = "") -> None:
+        show_reconfigure(system, server)
 
     @ui.page("/services")
     def services(service: str = "") -> None:
