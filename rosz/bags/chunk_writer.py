@@ -146,6 +146,11 @@ class ChunkWriter:
         """Bytes that wait for the disk, or for their chunk to be full."""
         return self._waiting + self._chunk.size
 
+    @property
+    def written(self) -> int:
+        """Number of messages in the file."""
+        return sum(self._counts.values())
+
     def wait_for_room(self, most: int) -> None:
         """Wait while more than so many bytes wait for the disk.
 
@@ -188,7 +193,6 @@ class ChunkWriter:
             index.append(stamp)
             index.append(chunk.size)
             chunk.add_message(head, data)
-            self._counts[handle] += 1
             if chunk.size >= self._chunk_size:
                 self._submit_chunk()
                 while self._waiting >= self._capacity and self._error is None:
@@ -290,13 +294,18 @@ class ChunkWriter:
         chunk = self._chunk
         if chunk.index:
             self._chunk = FilledChunk()
-            self._submit(chunk.size, partial(self._write_chunk, chunk))
+            self._submit(chunk.size, partial(self._write_messages, chunk))
 
     def _submit(self, size: int, write: Callable[[], None]) -> None:
         self._waiting += size
         self._worker.submit((size, write))
 
     # On the worker's thread, and at the end on that of `close`.
+
+    def _write_messages(self, chunk: FilledChunk) -> None:
+        self._write_chunk(chunk)
+        for handle, index in chunk.index.items():
+            self._counts[handle] += len(index) // 2
 
     def _write_item(self, item: _Item) -> None:
         size, write = item

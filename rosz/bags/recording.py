@@ -199,6 +199,10 @@ class Sink(Protocol):
     def waiting(self) -> int:
         """Bytes that wait for the disk."""
 
+    @property
+    def unwritten(self) -> int:
+        """Number of messages taken that no file has."""
+
     def track(self, channel: Channel, types: TypeStore) -> Track:
         """Begin to record a channel.
 
@@ -266,6 +270,7 @@ class BagFiles:
         self._index = count(first)
         self._start = 0
         self._written = 0
+        self._count_before = 0  # messages in the bags before this one
         self._closed = False
         self._beginning = False
         self.finished: threading.Event = threading.Event()
@@ -287,6 +292,11 @@ class BagFiles:
     def waiting(self) -> int:
         """Bytes that wait for the disk."""
         return self._writer.waiting
+
+    @property
+    def unwritten(self) -> int:
+        """Number of messages taken that no file has."""
+        return self.count - self._count_before - self._writer.written
 
     def _open(self) -> None:
         self._target, self._writer = _create(self._options, next(self._index))
@@ -374,6 +384,7 @@ class BagFiles:
             return False
         self._finish()
         self._written += self._writer.size
+        self._count_before = self.count
         self._start = stamp
         self._open()
         for track in self._tracks:
@@ -424,6 +435,10 @@ class BagFiles:
         active = self._writer.path
         try:
             self._writer.close()
+        except BagError:
+            if self._writer.complete:
+                self._report(f"'{self._target}' has {self._writer.written} messages.")
+            raise
         finally:
             if self._writer.complete:
                 if self._target.exists():
@@ -490,6 +505,11 @@ class Ring:
     @property
     def waiting(self) -> int:
         """Nothing waits for the disk."""
+        return 0
+
+    @property
+    def unwritten(self) -> int:
+        """Nothing is lost with a file."""
         return 0
 
     def track(self, channel: Channel, types: TypeStore) -> Track:

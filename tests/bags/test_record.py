@@ -395,6 +395,12 @@ def test_a_full_disk(network: Network) -> None:
         (path,) = disk.iterdir()
         with open_reader(path) as reader:
             found = [int(bytes(one.data[8:20]).split()[0]) for one in reader.messages({"/big"})]
+            (channel,) = (one for one in reader.channels if one.topic == "/big")
+            assert reader.count(channel) == len(found)
+            told = [line for line in program.lines if line.endswith(" lost")]
+            taken, *_, lost, _ = told[0].replace(",", "").split()
+            assert int(taken) - int(lost) == reader.count()
+            assert f"'disk/x.mcap' has {reader.count()} messages." in program.lines
         assert found == list(range(len(found)))
         assert len(found) * 50_000 > 1_500_000
     finally:

@@ -315,7 +315,7 @@ def _run(
     finally:
         if shown:
             progress.end()
-        lost = recorder.lost
+        lost = recorder.lost + (0 if recorder.error is None else sink.unwritten)
         seconds = time.monotonic() - begun
         report(f"{sink.count} messages in {seconds:.1f} s, {lost} lost")
 
