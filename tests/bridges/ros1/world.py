@@ -19,6 +19,8 @@ from rosz.bridges.ros1 import MasterBridge
 __all__ = ("LISTENER", "SERVER", "TALKER", "World", "roscpp")
 
 _PROGRAMS = Path(__file__).parent / "programs"
+_GENCPP = Path("/usr/lib/gencpp/gen_cpp.py")
+_GENCPP_TEMPLATES = Path("/usr/share/gencpp")
 _CACHE = Path(__file__).parents[3] / ".pytest_cache" / "d" / "roscpp"
 
 TALKER = """
@@ -63,14 +65,18 @@ rospy.spin()
 
 
 @cache
-def roscpp(name: str = "partner", *packages: str) -> str:
-    """Return a compiled program of `programs`, kept in pytest's cache from run to run.
+def roscpp(
+    name: str = "partner", *packages: str, folder: Path = _PROGRAMS, interfaces: Path | None = None
+) -> str:
+    """Return a compiled program, kept in pytest's cache from run to run.
 
     The test is skipped where it cannot be compiled.
 
     Args:
         name: Name of the program.
         packages: Packages of ROS 1 that it uses, beside roscpp.
+        folder: Where its source is.
+        interfaces: Package of its own messages and services, of a name equal to the program's.
     """
     if shutil.which("g++") is None or shutil.which("pkg-config") is None:
         pytest.skip("needs g++ and pkg-config (Debian: g++, pkg-config)")
@@ -78,10 +84,14 @@ def roscpp(name: str = "partner", *packages: str) -> str:
     flags = subprocess.run(ask, check=False, capture_output=True, text=True)
     if flags.returncode:
         pytest.skip(f"needs C++ libraries of Debian: {flags.stderr.strip()}")
-    source = _PROGRAMS / f"{name}.cpp"
+    source = folder / f"{name}.cpp"
+    files = [] if interfaces is None else sorted(interfaces.glob("*/*.[ms][sr][gv]"))
+    if files and not _GENCPP.exists():
+        pytest.skip("needs gencpp (Debian: gencpp)")
     versions = subprocess.check_output(["pkg-config", "--modversion", *ask[3:]])
     versions += subprocess.check_output(["g++", "-dumpfullversion"])
     content = source.read_bytes() + versions + flags.stdout.encode()
+    content += b"".join(file.read_bytes() for file in files)
     _CACHE.mkdir(parents=True, exist_ok=True)
     made = _CACHE / f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"
     with (_CACHE / f"{name}.lock").open(
@@ -90,8 +100,12 @@ def roscpp(name: str = "partner", *packages: str) -> str:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not made.exists():
             new = made.with_suffix(".new")
-            compiled = ["g++", "-O0", "-o", str(new), str(source), *flags.stdout.split()]
-            subprocess.run(compiled, check=True)
+            include = made.with_suffix(".include")
+            for file in files:
+                generate = [PYTHON, str(_GENCPP), str(file), "-p", name, "-o", str(include / name)]
+                subprocess.run([*generate, "-e", str(_GENCPP_TEMPLATES)], check=True)
+            compiled = ["g++", "-O0", f"-I{include}", "-o", str(new), str(source)]
+            subprocess.run([*compiled, *flags.stdout.split()], check=True)
             new.rename(made)
     return str(made)
 
