@@ -126,9 +126,9 @@ def test_launch_files(network: Network) -> None:
     transform = TransformStamped(Header(frame_id="map"), "base")
     StaticTransformBroadcaster(node).send(transform)
     port = free_port()
-    launch = network.run(
-        "-m", "rosz", "launch", str(network.folder / "pages.launch"), PORT=str(port)
-    )
+    file = network.folder / "pages.launch"
+    file.write_text(LAUNCH)
+    launch = network.run("-m", "rosz", "launch", str(file), PORT=str(port))
     graph = node.context.graph
     graph.wait_for_service("/republish_tfs", 4 * TIMEOUT)
     graph.wait_for_service("/rosapi/topics", 4 * TIMEOUT)
