@@ -1,4 +1,7 @@
-"""message_filters: callbacks for messages that belong together (ROS wiki, message_filters)."""
+"""message_filters: callbacks for messages that belong together (ROS wiki, message_filters).
+
+Sources are topics of rospy or, as in ROS 2, of a node of rclpy.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,17 @@ from rosz.ros1 import rospy
 
 __all__ = ("ApproximateTimeSynchronizer", "Cache", "SimpleFilter", "Subscriber", "TimeSynchronizer")
 
+_ROS2_DEPTH = 10
+
 
 class SimpleFilter:
-    """A source of messages for callbacks."""
+    """A source of messages for callbacks.
+
+    Attributes:
+        node: Node of rclpy that the messages come from; None for rospy.
+    """
+
+    node: Any = None
 
     def __init__(self) -> None:
         self.callbacks: dict[int, tuple[Callable[..., Any], tuple[Any, ...]]] = {}
@@ -35,19 +46,29 @@ class SimpleFilter:
 
 
 class Subscriber(SimpleFilter):
-    """A topic as a source; takes the arguments of ``rospy.Subscriber``.
+    """A topic as a source.
+
+    It takes the arguments of ``rospy.Subscriber``, or those of ROS 2: a node of rclpy, the class of
+    the messages, the name of the topic, and keyword arguments of ``create_subscription``.
 
     Attributes:
-        sub: The ``rospy.Subscriber``.
+        sub: The ``rospy.Subscriber``, or the subscription of rclpy.
         topic: Name of the topic, as given.
     """
 
+    sub: Any
+
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__()
-        self.topic: str = args[0] if args else kwargs["name"]
-        self.sub: rospy.Subscriber = rospy.Subscriber(
-            *args, **(kwargs | {"callback": self.callback})
-        )
+        if args and hasattr(args[0], "create_subscription"):
+            self.node, message_type, self.topic = args
+            kwargs.setdefault("qos_profile", _ROS2_DEPTH)
+            self.sub = self.node.create_subscription(
+                message_type, self.topic, callback=self.callback, **kwargs
+            )
+            return
+        self.topic = args[0] if args else kwargs["name"]
+        self.sub = rospy.Subscriber(*args, **(kwargs | {"callback": self.callback}))
 
     def callback(self, msg: Any) -> None:
         """Receive a message."""
@@ -63,18 +84,29 @@ class Subscriber(SimpleFilter):
         return getattr(self.sub, key)
 
 
-def _stamp_of(msg: Any, allow_headerless: bool) -> Any:
+def _now(node: Any) -> Any:
+    return rospy.Time.now() if node is None else node.get_clock().now()
+
+
+def _nanoseconds(node: Any) -> int:
+    now = _now(node)
+    found: int = now.to_nsec() if node is None else now.nanoseconds
+    return found
+
+
+def _stamp_of(msg: Any, allow_headerless: bool, node: Any) -> Any:
     """Return the stamp of a message; without one, the current time if allowed, else None."""
     header = getattr(msg, "header", None)
     stamp = getattr(header, "stamp", None)
     if stamp is not None:
-        return stamp
+        return stamp if node is None else type(_now(node)).from_msg(stamp)
     if allow_headerless:
-        return rospy.Time.now()
-    rospy.logwarn(
+        return _now(node)
+    text = (
         "Cannot use message filters with non-stamped messages. Use the 'allow_headerless'"
         " constructor option to auto-assign ROS time to headerless messages."
     )
+    (rospy.logwarn if node is None else node.get_logger().warning)(text)
     return None
 
 
@@ -102,6 +134,7 @@ class TimeSynchronizer(SimpleFilter):
 
     def connectInput(self, fs: Sequence[SimpleFilter]) -> None:  # noqa: N802  # ROS 1's
         """Receive messages from sources."""
+        self.node = next((source.node for source in fs if source.node is not None), None)
         self.queues = [{} for _ in fs]
         self.input_connections = [
             source.registerCallback(self.add, queue, index)
@@ -138,7 +171,7 @@ class TimeSynchronizer(SimpleFilter):
     def _reset_after_jump(self, queue: Queue, index: int | None) -> None:
         if not self.enable_reset or index is None:
             return
-        moment = rospy.Time.now().to_nsec()
+        moment = _nanoseconds(self.node)
         if moment < self._latest.get(index, 0):
             queue.clear()
         self._latest[index] = moment
@@ -176,12 +209,12 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             my_queue: Queue of its source.
             my_queue_index: Number of its source.
         """
-        stamp = _stamp_of(msg, self.allow_headerless)
+        stamp = _stamp_of(msg, self.allow_headerless, self.node)
         if stamp is None:
             return
         with self.lock:
             self._reset_after_jump(my_queue, my_queue_index)
-            own = stamp.to_nsec()
+            own = stamp.to_nsec() if self.node is None else stamp.nanoseconds
             self._put(my_queue, own, msg)
             self._reset_all_after_jump()  # as in ROS 1, with the message that shows the jump
             if own not in my_queue:  # older than all that wait, or before a jump
@@ -192,7 +225,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
                 self._signal(found)
 
     def _reset_all_after_jump(self) -> None:
-        moment = rospy.Time.now().to_nsec()
+        moment = _nanoseconds(self.node)
         if moment < self._last_added:
             for queue in self.queues:
                 queue.clear()
@@ -233,11 +266,12 @@ class Cache(SimpleFilter):
 
     def connectInput(self, f: SimpleFilter) -> None:  # noqa: N802  # ROS 1's
         """Receive messages from a source."""
+        self.node = f.node
         self.incoming_connection = f.registerCallback(self.add)
 
     def add(self, msg: Any) -> None:
         """Receive a message; a full cache drops the one that came first."""
-        stamp = _stamp_of(msg, self.allow_headerless)
+        stamp = _stamp_of(msg, self.allow_headerless, self.node)
         if stamp is None:
             return
         if len(self.cache_msgs) >= self.cache_size:

@@ -184,3 +184,54 @@ def test_subscribers(network: Network) -> None:
     program.wait_for("both 0.0 1.0")
     assert program.exit_code() == 0
     assert program.lines[0] == "a /a"
+
+
+def test_nodes_of_rclpy(network: Network) -> None:
+    """The arguments, times and clocks of ROS 2."""
+    program = network.program(
+        """
+        import rosz.ros1
+        import message_filters, rclpy
+        from rclpy.duration import Duration
+        from rclpy.time import Time
+        from sensor_msgs.msg import FluidPressure, Temperature
+        from std_msgs.msg import Header, String
+
+        rclpy.init()
+        node = rclpy.create_node("n")
+        sources = [
+            message_filters.Subscriber(node, Temperature, "temperature", qos_profile=5),
+            message_filters.Subscriber(node, FluidPressure, "pressure"),
+        ]
+        near = message_filters.ApproximateTimeSynchronizer(sources, 10, 0.05)
+        equal = message_filters.TimeSynchronizer(sources, 10)
+        cache = message_filters.Cache(sources[0], 100)
+        words = message_filters.SimpleFilter()
+        words.node = node
+        late = message_filters.Cache(words, 1, allow_headerless=True)
+        heard = set()
+        def near_each_other(temperature, pressure):
+            shift = Time.from_msg(pressure.header.stamp) - Time.from_msg(temperature.header.stamp)
+            heard.add(f"near {abs(shift.nanoseconds)}")
+        near.registerCallback(near_each_other)
+        equal.registerCallback(lambda temperature, pressure: heard.add("equal"))
+        first = node.create_publisher(Temperature, "temperature", 10)
+        second = node.create_publisher(FluidPressure, "pressure", 10)
+        def publish():
+            now = node.get_clock().now()
+            first.publish(Temperature(header=Header(stamp=now.to_msg())))
+            second.publish(FluidPressure(header=Header(stamp=now.to_msg())))
+            if {"near 0", "equal"} <= heard and not node.done:
+                node.done = True
+                words.signalMessage(String())
+                print(cache.getInterval(now - Duration(seconds=60), now) != [])
+                print(now - Duration(seconds=60) < cache.getLatestTime(), late.getLast())
+                rclpy.shutdown()
+        node.done = False
+        node.create_timer(0.1, publish)
+        rclpy.spin(node)
+        print(sources[1].getTopic(), sorted(heard & {"near 0", "equal"}))
+        """
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines[-3:] == ["True", "True data: ''", "pressure ['equal', 'near 0']"]
