@@ -16,6 +16,7 @@ ROBOT = """
 import math
 import rosz
 from rosz.msgs.geometry_msgs.msg import Twist
+from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import Float64, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.reconfigure import Choice, Description, Group, Server, Setting, enumeration
@@ -51,11 +52,15 @@ with rosz.Node("robot") as node:
     node.params.set("~rate", 20)
     node.params.set("~gains", {"p": 1.5, "names": ["a", "b"], "on": True})
     node.params.watch("~rate", lambda change: print("rate is", change.new, flush=True))
+    camera = node.publisher("camera", Image)
     server = Server(node, SETTINGS, reconfigured)
     node.timer(1.0, lambda event: node.log.warning("the battery is low"))
     print("ready", flush=True)
     for tick in node.rate(20):
         chatter.publish(String(data=f"hello {tick}"))
+        if tick % 4 == 0:
+            rows = bytes((x * 3 + tick) % 256 for x in range(80)) * 60
+            camera.publish(Image(height=60, width=80, encoding="mono8", step=80, data=rows))
         wave.publish(Float64(data=math.sin(tick / 10)))
 """
 

@@ -12,9 +12,12 @@ from network import TIMEOUT, Network, eventually
 from rosz.errors import NotFoundError, UsageError, YamlError
 from rosz.introspect.rosout import LogFilter
 from rosz.msgs.geometry_msgs.msg import PoseStamped, Twist, Vector3
+from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import Float64MultiArray, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.web.model import (
+    Driver,
+    ImageWatch,
     LogBook,
     Parameters,
     Permission,
@@ -84,6 +87,55 @@ def test_a_page_publishes_once_and_at_a_rate(network: Network) -> None:
     assert sending.repeats
     sending.close()
     assert not sending.repeats
+
+
+def test_driving_ends_when_the_browser_is_silent(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    got: list[float] = []
+    stopped = threading.Event()
+
+    def receive(message: Twist) -> None:
+        got.append(message.linear.x)
+        if message.linear.x == 0 and 0.5 in got:
+            stopped.set()
+
+    robot.subscription("cmd_vel", Twist, receive, queue_size=100)
+    driver = Driver(page, Permission(), "/cmd_vel")
+    driver.drive(0.5, 0.0)
+    assert stopped.wait(TIMEOUT)
+    assert not driver.driving
+    with pytest.raises(UsageError, match="read-only"):
+        Driver(page, Permission(read_only=True), "/cmd_vel")
+    driver.close()
+
+
+@pytest.mark.parametrize(
+    ("encoding", "size", "value"),
+    [
+        ("mono8", 1, "(1, 0): 7"),
+        ("bgr8", 3, "(1, 0): 7, 7, 7"),
+        ("rgba8", 4, "(1, 0): 7, 7, 7, 7"),
+        ("mono16", 2, "(1, 0): 1799"),
+        ("16UC1", 2, "(1, 0): 1799"),
+        ("32FC1", 4, "(1, 0): "),
+        ("bayer_rggb8", 1, "(1, 0): 7"),
+        ("yuv422", 2, "(1, 0): "),
+    ],
+)
+def test_images_are_pictures(network: Network, encoding: str, size: int, value: str) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    image = Image(height=2, width=4, encoding=encoding, step=4 * size, data=bytes([7] * 8 * size))
+    robot.publisher("camera", Image, latch=True).publish(image)
+    graph = System(page, Permission()).graph.use().value
+    eventually(lambda: graph.survey().view.publishers("/camera"), "the publisher")
+    watch = ImageWatch(page, graph.survey(), "/camera")
+    eventually(lambda: watch.received, "the image")
+    assert watch.encoded()[0].startswith(b"\xff\xd8")
+    assert watch.encoded(".png")[0].startswith(b"\x89PNG")
+    assert watch.description() == f"4 x 2 {encoding}"
+    assert watch.value_at(1, 0).startswith(value)
+    assert watch.value_at(9, 0) == ""
+    watch.close()
 
 
 def test_a_page_calls_a_service(network: Network) -> None:

@@ -123,12 +123,16 @@ SEEN = {
     "/topics": ("data", "std_msgs/String", "hello"),
     "/plot": ("/wave/data", "Pause"),
     "/console": ("the battery is low", "/robot"),
+    "/drive": ("It stands.", "hold the arrow keys"),
+    "/images": ("/camera", "80 x 60 mono8"),
     "/parameters": ("gains", "rate", "1.5"),
     "/reconfigure": ("speed", "How fast it drives", "Camera", "lights"),
     "/services": ("/enable", "std_srvs/SetBool"),
 }
 QUERY = {
     "/graph": "?content=all",
+    "/drive": "?topic=/cmd_vel",
+    "/images": "?topics=/camera",
     "/plot": "?fields=/wave/data",
     "/reconfigure": "?server=/robot",
     "/services": "?service=/enable",
@@ -189,6 +193,26 @@ def test_a_slider_reaches_the_node_and_the_node_the_slider(world: World) -> None
         client.update({"speed": 1.75})
     value = "return document.querySelector('input[aria-label=speed]').value"
     eventually(lambda: world.browser.execute_script(value) == "1.75", "1.75 on the page", LONG)
+    assert world.messages() == []
+
+
+def test_a_key_drives_as_long_as_it_is_held(world: World) -> None:
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    set_screen(world.browser, "laptop", "light")
+    world.open("/drive?topic=/cmd_vel")
+    world.should_see("It stands.")
+    keys = ActionChains(world.browser)
+
+    def press() -> bool:
+        keys.key_down(Keys.ARROW_UP).perform()
+        return "drives 1.0" in world.robot.output
+
+    eventually(press, "the robot drives", LONG)
+    keys.key_up(Keys.ARROW_UP).perform()
+    world.robot.wait_for("drives 0.0", LONG)
+    world.should_see("It stands.")
     assert world.messages() == []
 
 

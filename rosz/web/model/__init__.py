@@ -6,9 +6,11 @@ newest wins. Pages read what they show at their own pace, so that a slow browser
 
 from rosz.web.model.calling import call_service
 from rosz.web.model.console import LogBook
+from rosz.web.model.driving import Driver
 from rosz.web.model.findings import Findings
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
+from rosz.web.model.pictures import IMAGE_TYPES, ImageWatch, Pictures
 from rosz.web.model.plotting import Plot, split_fields
 from rosz.web.model.reconfiguring import Reconfiguration
 from rosz.web.model.sending import Sending, form_of
@@ -18,10 +20,14 @@ from rosz.web.model.topic import TopicWatch, message_tree
 from rosz.web.model.traffic import Traffic
 
 __all__ = (
+    "IMAGE_TYPES",
+    "Driver",
     "Findings",
+    "ImageWatch",
     "LogBook",
     "Parameters",
     "Permission",
+    "Pictures",
     "Plot",
     "Reconfiguration",
     "Sending",

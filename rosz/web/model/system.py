@@ -9,6 +9,7 @@ from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
+from rosz.web.model.pictures import Pictures
 from rosz.web.model.sharing import Shared
 from rosz.web.model.traffic import Traffic
 
@@ -65,6 +66,7 @@ class System:
         findings: Findings of the doctor.
         console: The log of all nodes.
         parameters: The parameters of all nodes.
+        pictures: The sources of pictures.
     """
 
     def __init__(self, node: Node, permission: Permission) -> None:
@@ -73,6 +75,7 @@ class System:
         self.graph: Shared[GraphWatch] = Shared(lambda: GraphWatch(node))
         self.traffic: Shared[Traffic] = Shared(lambda: Traffic(node))
         self.findings: Shared[Findings] = Shared(lambda: Findings(node.context.environment))
+        self.pictures = Pictures()
         self.console: Shared[LogBook] = Shared(lambda: LogBook(node))
         self.parameters: Shared[Parameters] = Shared(lambda: Parameters(node, permission))
 

@@ -55,7 +55,7 @@ class _Console:
                 "subject",
                 "No line yet",
                 "Lines appear as nodes log them. A node that logs:",
-                "rosz launch launch/pub_and_sub.launch",
+                "rosz run rosz_tutorials publisher.py",
             )
         frame.every(_PERIOD, self._refresh)
 

@@ -54,10 +54,12 @@ ENTRIES = (
     Entry("/graph", "Graph", "hub"),
     Entry("/topics", "Topics", "swap_horiz"),
     Entry("/plot", "Plot", "show_chart"),
+    Entry("/images", "Images", "photo_camera"),
     Entry("/console", "Console", "subject"),
     Entry("/parameters", "Parameters", "tune"),
     Entry("/reconfigure", "Reconfigure", "settings_input_component"),
     Entry("/services", "Services", "build"),
+    Entry("/drive", "Drive", "sports_esports"),
 )
 """The pages, in the order of the navigation."""
 

@@ -59,7 +59,7 @@ class _Reconfigure:
                 "tune",
                 "No node has settings",
                 "Nodes with a server of dynamic_reconfigure appear here, such as:",
-                "rosz launch launch/reconfigure.launch",
+                "rosz run rosz_tutorials wave.py",
             )
             self._box = ui.column().classes("w-full gap-4")
         frame.keep(self)

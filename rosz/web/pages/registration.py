@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from nicegui import ui
+from fastapi import Response
+from nicegui import app, ui
 
+from rosz.errors import RoszError
 from rosz.web.model import System
 from rosz.web.pages.console import show_console
+from rosz.web.pages.drive import show_drive
 from rosz.web.pages.graph import show_graph
+from rosz.web.pages.images import show_images
 from rosz.web.pages.overview import show_overview
 from rosz.web.pages.parameters import show_parameters
 from rosz.web.pages.plot import show_plot
@@ -16,9 +20,14 @@ from rosz.web.pages.topics import show_topics
 
 __all__ = ("add_pages",)
 
+_FRESH = {"Cache-Control": "no-store"}
+
 
 def add_pages(system: System) -> None:
     """Give every page its address."""
+    _add_pages_of_data(system)
+    _add_pages_of_nodes(system)
+    _add_pictures(system)
 
     @ui.page("/")
     def overview() -> None:
@@ -28,14 +37,26 @@ def add_pages(system: System) -> None:
     def graph(content: str = "nodes", nodes: str = "", topics: str = "", group: int = 0) -> None:
         show_graph(system, content, nodes, topics, group)
 
+
+def _add_pages_of_data(system: System) -> None:
     @ui.page("/topics")
     def topics(topic: str = "", field: str = "") -> None:
         show_topics(system, topic, field)
+
+    @ui.page("/images")
+    def images(topics: str = "") -> None:
+        show_images(system, topics)
+
+    @ui.page("/drive")
+    def drive(topic: str = "") -> None:
+        show_drive(system, topic)
 
     @ui.page("/console")
     def console(node: str = "", level: str = "DEBUG", pattern: str = "") -> None:
         show_console(system, node, level, pattern)
 
+
+def _add_pages_of_nodes(system: System) -> None:
     @ui.page("/parameters")
     def parameters(prefix: str = "") -> None:
         show_parameters(system, prefix)
@@ -51,3 +72,15 @@ def add_pages(system: System) -> None:
     @ui.page("/services")
     def services(service: str = "") -> None:
         show_services(system, service)
+
+
+def _add_pictures(system: System) -> None:
+    @app.get("/picture/{key}")
+    def picture(key: str) -> Response:  # a plain function: it runs on another thread
+        try:
+            found = system.pictures.take(key)
+        except RoszError as error:
+            return Response(str(error), status_code=503, headers=_FRESH)
+        if found is None:
+            return Response("this picture is gone", status_code=404, headers=_FRESH)
+        return Response(found[0], media_type=found[1], headers=_FRESH)

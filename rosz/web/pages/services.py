@@ -42,7 +42,7 @@ class _Services:
                 "build",
                 "No service",
                 "Nodes that offer services appear here, such as:",
-                "rosz run rosz_tutorials add_two_ints_server",
+                "rosz run rosz_tutorials add_two_ints_server.py",
             )
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
                 with ui.column().classes("rosz-card p-4 gap-2 min-w-0") as self._card:
