@@ -19,17 +19,15 @@ def _of_ros2(what: str) -> str:
     )
 
 
-_GRAPHS = "use 'rosz node list', 'rosz node info' and 'rosz topic info', or " + _of_ros2(
-    "rqt_graph"
-)
-_PICTURES = _of_ros2("rqt_image_view")
+_GRAPHS = "'rosz web' shows it at /graph, and 'rosz graph -o graph.svg' draws it"
+_PICTURES = "'rosz web' shows images at /images"
 _BAGS = "use 'rosz bag info', 'rosz bag play' and 'rosz bag export'; Foxglove shows MCAP files"
 _GAZEBO = "'rosz launch turtlebot3_sim turtlebot3_sim.launch' simulates a TurtleBot3; " + _of_ros2(
     "ros_gz_bridge"
 )
 _TRANSFORMS = "in a node use tf2_ros: Buffer, TransformListener, StaticTransformBroadcaster"
 _LAUNCH = "launch files are XML: 'rosz launch PACKAGE FILE' runs them"
-_PLOT = "'rosz topic echo -p TOPIC' prints CSV to plot; " + _of_ros2("rqt_plot")
+_PLOT = "'rosz web' plots at /plot, and 'rosz topic echo -p TOPIC' prints CSV to plot"
 
 COMMANDS = {
     "catkin": _NOTHING_TO_BUILD,
@@ -47,17 +45,16 @@ COMMANDS = {
     "rosmaster": _MASTER,
     "rostest": "start the nodes with 'rosz launch' and run the test, which may import rostest",
     "rosversion": "'rosz --version' prints the version of rosz",
-    "rqt": "'rosz log', 'rosz reconfigure', 'rosz topic' and 'rosz node' show it; "
-    + _of_ros2("rqt"),
+    "rqt": "'rosz web' shows graph, plots, log, parameters and more in a browser",
     "rqt_bag": _BAGS,
-    "rqt_console": "use 'rosz log'; 'rosz log level NODE LOGGER LEVEL' sets levels",
+    "rqt_console": "'rosz web' shows it at /console, and 'rosz log' prints it",
     "rqt_graph": _GRAPHS,
     "rqt_image_view": _PICTURES,
-    "rqt_logger_level": "use 'rosz log level NODE LOGGER LEVEL'",
+    "rqt_logger_level": "use 'rosz log level NODE LOGGER LEVEL', or /console of 'rosz web'",
     "rqt_plot": _PLOT,
-    "rqt_publisher": "use 'rosz topic pub'",
+    "rqt_publisher": "use 'rosz topic pub', or /topics of 'rosz web'",
     "rqt_tf_tree": "'rosz tf tree' prints it, 'rosrun tf view_frames' draws it",
-    "rqt_topic": "use 'rosz topic list -v', 'rosz topic echo' and 'rosz topic hz'",
+    "rqt_topic": "use 'rosz topic list -v', 'rosz topic echo' and 'rosz topic hz', or 'rosz web'",
     "rviz": _of_ros2("rviz2"),
     "wstool": "git gets sources; a package below 'src' of the workspace is found as it is",
 }

@@ -65,6 +65,20 @@ def test_a_command_that_the_machine_has_goes_first(network: Network) -> None:
     assert (done.stdout, done.stderr) == ("the real one\n", "")
 
 
+@pytest.mark.parametrize(
+    ("name", "page"),
+    [
+        ("rqt_console", "/console"),
+        ("rqt_graph", "/graph"),
+        ("rqt_image_view", "/images"),
+        ("rqt_plot", "/plot"),
+    ],
+)
+def test_windows_of_rqt_are_pages(name: str, page: str) -> None:
+    assert "'rosz web'" in instead_of(name)
+    assert page in instead_of(name)
+
+
 @pytest.mark.parametrize("name", ["rviz", "image_view", "rqt_anything", "gazebo_ros"])
 def test_a_program_of_a_package(network: Network, name: str) -> None:
     done = evaluate(network, f"rosrun {name} {name}")
