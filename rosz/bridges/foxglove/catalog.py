@@ -210,7 +210,7 @@ class Catalog:
             self._listening.close()
             self._followed.close()
             self._followed = self._listening = None
-        self._requested = {kind: one for kind, one in self._requested.items() if one is not None}
+        self._forget_requests(set())
         for listing in self._listings:
             listing.retain({})
 
@@ -235,6 +235,8 @@ class Catalog:
         if self._followed is None:
             return
         view = self._followed.view()
+        alive = {(token.type_name, token.type_hash) for token in view.tokens}
+        self._forget_requests(alive)
         if self._watchers:
             before, self._graph = self._graph, self._connections(view)
             if before != self._graph:
@@ -272,6 +274,14 @@ class Catalog:
             self._requests.submit(partial(self._request, kind, token))
         return self._requested[kind]
 
+    def _forget_requests(self, alive: set[tuple[str, str]]) -> None:
+        """Let types be requested again that nobody described, and that nobody has any more."""
+        self._requested = {
+            kind: found
+            for kind, found in self._requested.items()
+            if found is not None or kind in alive
+        }
+
     def _request(self, kind: tuple[str, str], token: Token) -> None:
         """Request a definition; on a thread for requests."""
         try:
@@ -286,7 +296,7 @@ class Catalog:
         self._update()
 
     def _refuse(self, token: Token, error: RoszError) -> None:
-        """Report a type that nobody can describe; it is requested again from the next client on."""
+        """Report a type that its node does not describe."""
         text = f"'{token.name}' is not shown, as its type is not known: {error}"
         self._node.log.warning("%s", text)
         _send(self._members, {"op": "status", "level": 1, "message": text})

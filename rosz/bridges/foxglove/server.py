@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import http
 import logging
 import re
 import ssl
-import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import TYPE_CHECKING, Self
 
@@ -24,14 +21,15 @@ from rosz.bridges.foxglove.parameters import Parameters
 from rosz.bridges.foxglove.protocol import SUBPROTOCOLS
 from rosz.bridges.foxglove.services import Services
 from rosz.bridges.gate import Gate
+from rosz.bridges.listener import Listener, place
 from rosz.bridges.websocket import Encodings, Outbox, Topics
-from rosz.errors import RoszError, TransportError, UsageError
-from rosz.lifecycle import Lifecycle, Registration
+from rosz.errors import RoszError
+from rosz.lifecycle import Lifecycle
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
-    from websockets.asyncio.server import Server, ServerConnection
-    from websockets.http11 import Request, Response
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request
 
     from rosz.node import Node
 
@@ -40,11 +38,8 @@ __all__ = ("PORT", "FoxgloveBridge", "Limits", "Offer")
 PORT = 8765
 """Port of foxglove_bridge."""
 
-_LIBRARY = "the Foxglove bridge needs a library: pip install 'rosz[foxglove]'"
 _CALLS = 64
-_HANDLERS = 16
 _POLICY = 1008
-_START_SECONDS = 10.0
 _UNREAD = "answers wait that the client does not read"
 
 
@@ -132,72 +127,34 @@ class FoxgloveBridge:
             str(time.time_ns()),
             offer.capabilities,
         )
-        self._handlers = ThreadPoolExecutor(_HANDLERS, "rosz-foxglove")
-        self._loop = asyncio.new_event_loop()
-        self._clients: dict[ServerConnection, asyncio.Future[None]] = {}
-        self._server: Server
-        self.port: int = 0
-        self._thread = threading.Thread(
-            target=self._loop.run_forever, name="rosz-foxglove", daemon=True
+        self._listener = keep.keep(
+            Listener(
+                "foxglove",
+                node.log,
+                admission,
+                limits.clients,
+                self._serve,
+                accept=self._accept,
+                subprotocols=list(SUBPROTOCOLS),
+                max_size=limits.message,
+            )
         )
-        self._thread.start()
-        keep.keep(Registration(self._end))
         try:
-            opening = asyncio.run_coroutine_threadsafe(self._open(host, port, tls), self._loop)
-            opening.result(_START_SECONDS)
+            self._listener.open(host, port, tls)
         except BaseException:
             self.close()
             raise
+        self.port: int = self._listener.port
 
-    async def _open(self, host: str, port: int, tls: ssl.SSLContext | None) -> None:
-        try:
-            from websockets.asyncio.server import serve
-            from websockets.typing import Subprotocol
-        except ImportError as error:
-            raise UsageError(f"{_LIBRARY} ({error})") from error
-        try:
-            self._server = await serve(
-                self._serve,
-                host,
-                port,
-                ssl=tls,
-                process_request=self._admit,
-                subprotocols=[Subprotocol(name) for name in SUBPROTOCOLS],
-                max_size=self._limits.message,
-                compression=None,  # it costs more than the links that this is for
-                server_header=None,
-                logger=_quiet,
-            )
-        except OSError as error:
-            raise TransportError(f"cannot listen at {host} port {port}: {error}") from error
-        self.port = next(iter(self._server.sockets)).getsockname()[1]
-
-    # Connections.
-
-    def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Refuse a request to connect, with the reason, or accept it."""
-        status = http.HTTPStatus.FORBIDDEN
-        reason = self._admission.objection(request.path, request.headers)
-        if not reason and not self._admission.is_known(request):
-            status = http.HTTPStatus.UNAUTHORIZED
-            reason = (
-                "the password is missing: connect to an address that ends with /?token=PASSWORD"
-            )
-        if not reason and len(self._clients) >= self._limits.clients:
-            status = http.HTTPStatus.SERVICE_UNAVAILABLE
-            reason = f"there are {len(self._clients)} clients, which is the limit"
-        if reason:
-            self._log.warning("a client at %s is refused: %s", _place(connection), reason)
-            return connection.respond(status, f"{reason}\n")
-        # It counts from here on, since others may come before it is served.
-        self._clients[connection] = end = asyncio.ensure_future(connection.wait_closed())
-        end.add_done_callback(lambda _: self._clients.pop(connection))
-        return None
+    def _accept(self, _connection: ServerConnection, request: Request) -> str:
+        if self._admission.is_known(request):
+            return ""
+        return "the password is missing: the address of the bridge ends with /?token=PASSWORD"
 
     async def _serve(self, websocket: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        loop, wanted = self._loop, asyncio.Event()
+        loop, wanted = self._listener.loop, asyncio.Event()
 
         def wake() -> None:
             with suppress(RuntimeError):  # the loop is closed
@@ -208,19 +165,19 @@ class FoxgloveBridge:
                 asyncio.run_coroutine_threadsafe(websocket.close(_POLICY, _UNREAD), loop)
 
         outbox = Outbox(self._limits.waiting, wake, refuse)
-        place, limit = _place(websocket), self._limits.message
-        connection = Connection(self._shared, outbox, place, limit)
+        connection = Connection(self._shared, outbox, place(websocket), self._limits.message)
         sender = asyncio.ensure_future(self._send(websocket, connection, outbox, wanted))
+        run = self._listener.run
         try:
-            await loop.run_in_executor(self._handlers, connection.open)
+            await run(connection.open)
             async for data in websocket:
-                await loop.run_in_executor(self._handlers, connection.handle, data)
-        except (ConnectionClosed, RuntimeError):  # the executor has been shut down
+                await run(connection.handle, data)
+        except (ConnectionClosed, RuntimeError):  # the listener has been closed
             pass
         finally:
             sender.cancel()
             with suppress(RuntimeError):
-                await loop.run_in_executor(self._handlers, connection.close)
+                await run(connection.close)
 
     async def _send(
         self,
@@ -255,39 +212,14 @@ class FoxgloveBridge:
     @property
     def clients(self) -> int:
         """Number of clients that are connected."""
-        return len(self._clients)
+        return self._listener.clients
 
     def close(self) -> None:
         """End the bridge and all connections; a second call has no effect."""
         self._lifecycle.close()
-
-    def _end(self) -> None:
-        async def end() -> None:
-            server = getattr(self, "_server", None)
-            if server is not None:
-                server.close()
-                await server.wait_closed()
-            await self._loop.shutdown_default_executor()
-
-        with suppress(TimeoutError):
-            asyncio.run_coroutine_threadsafe(end(), self._loop).result(_START_SECONDS)
-        self._handlers.shutdown(wait=False, cancel_futures=True)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(_START_SECONDS)
-        self._loop.close()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exc: object) -> None:
         self.close()
-
-
-_quiet = logging.getLogger("rosz.foxglove")
-_quiet.addHandler(logging.NullHandler())
-_quiet.propagate = False
-
-
-def _place(connection: ServerConnection) -> str:
-    address = connection.remote_address
-    return f"{address[0]} port {address[1]}" if address else "an unknown address"

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import http
 import logging
 import ssl
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,6 +14,7 @@ import msgspec
 
 from rosz.bridges.admission import Admission
 from rosz.bridges.gate import Gate
+from rosz.bridges.listener import Listener, place
 from rosz.bridges.websocket.actions import Gateways
 from rosz.bridges.websocket.connection import Connection, Shared
 from rosz.bridges.websocket.operations import fragments, png
@@ -23,14 +22,14 @@ from rosz.bridges.websocket.outbox import Encodings, Message, Outbox
 from rosz.bridges.websocket.plain import Spelling
 from rosz.bridges.websocket.rosapi import RosApi
 from rosz.bridges.websocket.topics import Topics
-from rosz.errors import RoszError, TransportError, UsageError
-from rosz.lifecycle import Lifecycle, Registration
+from rosz.errors import RoszError
+from rosz.lifecycle import Lifecycle
 from rosz.transforms import Republisher
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
-    from websockets.asyncio.server import Server, ServerConnection
-    from websockets.http11 import Request, Response
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request
 
     from rosz.node import Node
 
@@ -39,14 +38,11 @@ __all__ = ("PORT", "Limits", "WebsocketBridge")
 PORT = 9090
 """Port of rosbridge."""
 
-_LIBRARY = "the websocket bridge needs a library: pip install 'rosz[websocket]'"
 _CALLS = 64
-_HANDLERS = 16
 _ENCODED_HERE = 16384
 """Bytes of a message that the thread of the server encodes itself."""
 _POLICY = 1008
 _LATE = "the password is missing"  # what a client is told
-_START_SECONDS = 10.0
 
 
 class Limits(msgspec.Struct, frozen=True):
@@ -122,69 +118,30 @@ class WebsocketBridge:
             spelling,
             admission.password,
         )
-        self._handlers = ThreadPoolExecutor(_HANDLERS, "rosz-websocket")
-        self._loop = asyncio.new_event_loop()
-        self._clients: dict[ServerConnection, asyncio.Future[None]] = {}
         self._republishing = threading.Lock()
         self._republisher: Republisher | None = None
-        self._server: Server
-        self.port: int = 0
-        self._thread = threading.Thread(
-            target=self._loop.run_forever, name="rosz-websocket", daemon=True
+        self._listener = self._lifecycle.keep(
+            Listener(
+                "websocket", node.log, admission, limits.clients, self._serve, accept=self._accept
+            )
         )
-        self._thread.start()
-        self._lifecycle.keep(Registration(self._end))
         try:
-            opening = asyncio.run_coroutine_threadsafe(self._open(host, port, tls), self._loop)
-            opening.result(_START_SECONDS)
+            self._listener.open(host, port, tls)
         except BaseException:
             self.close()
             raise
+        self.port: int = self._listener.port
 
-    async def _open(self, host: str, port: int, tls: ssl.SSLContext | None) -> None:
-        try:
-            from websockets.asyncio.server import serve
-        except ImportError as error:
-            raise UsageError(f"{_LIBRARY} ({error})") from error
-        try:
-            self._server = await serve(
-                self._serve,
-                host,
-                port,
-                ssl=tls,
-                process_request=self._admit,
-                compression=None,  # it costs more than the links that this is for
-                server_header=None,
-                logger=_quiet,
-            )
-        except OSError as error:
-            raise TransportError(f"cannot listen at {host} port {port}: {error}") from error
-        self.port = next(iter(self._server.sockets)).getsockname()[1]
-
-    # Connections.
-
-    def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Refuse a request to connect, with the reason, or accept it."""
-        reason = self._admission.objection(request.path, request.headers)
-        status = http.HTTPStatus.FORBIDDEN
-        if not reason and len(self._clients) >= self._limits.clients:
-            reason = f"there are {len(self._clients)} clients, which is the limit"
-            status = http.HTTPStatus.SERVICE_UNAVAILABLE
-        if reason:
-            self._log.warning("a client at %s is refused: %s", _place(connection), reason)
-            return connection.respond(status, f"{reason}\n")
+    def _accept(self, connection: ServerConnection, request: Request) -> str:
         limits = self._limits
         known = self._admission.is_known(request)
         connection.protocol.max_message_size = limits.operation if known else limits.password
-        # It counts from here on, since others may come before its first operation.
-        self._clients[connection] = end = asyncio.ensure_future(connection.wait_closed())
-        end.add_done_callback(lambda _: self._clients.pop(connection))
-        return None
+        return ""
 
     async def _serve(self, websocket: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        loop, wanted = self._loop, asyncio.Event()
+        loop, wanted = self._listener.loop, asyncio.Event()
 
         def wake() -> None:
             with suppress(RuntimeError):  # the loop is closed
@@ -197,12 +154,12 @@ class WebsocketBridge:
         outbox = Outbox(
             self._limits.waiting, wake, lambda: refuse("answers wait that the client does not read")
         )
-        await loop.run_in_executor(self._handlers, self._republish)
+        await self._listener.run(self._republish)
         trusted = self._admission.is_known(websocket.request)
         connection = Connection(
             self._shared,
             outbox,
-            _place(websocket),
+            place(websocket),
             refuse,
             trusted=trusted,
             limit=self._limits.operation,
@@ -217,16 +174,16 @@ class WebsocketBridge:
         late = loop.call_later(self._limits.password_seconds, check_trust)
         try:
             async for text in websocket:
-                await loop.run_in_executor(self._handlers, connection.handle, text)
+                await self._listener.run(connection.handle, text)
                 if connection.trusted:
                     websocket.protocol.max_message_size = self._limits.operation
-        except (ConnectionClosed, RuntimeError):  # the executor has been shut down
+        except (ConnectionClosed, RuntimeError):  # the listener has been closed
             pass
         finally:
             sender.cancel()
             late.cancel()
             with suppress(RuntimeError):
-                await loop.run_in_executor(self._handlers, connection.close)
+                await self._listener.run(connection.close)
 
     def _republish(self) -> None:
         """Serve transforms to pages from the first client on, unless a node does so."""
@@ -270,7 +227,7 @@ class WebsocketBridge:
         try:
             if message.size <= _ENCODED_HERE and feed.form[0] != "png":
                 return encode()
-            return await self._loop.run_in_executor(self._handlers, encode)
+            return await self._listener.run(encode)
         except (RoszError, ImportError) as error:
             self._log.warning("cannot send a message to a client: %s", error)
             return []
@@ -280,39 +237,14 @@ class WebsocketBridge:
     @property
     def clients(self) -> int:
         """Number of clients that are connected."""
-        return len(self._clients)
+        return self._listener.clients
 
     def close(self) -> None:
         """End the bridge and all connections; a second call has no effect."""
         self._lifecycle.close()
-
-    def _end(self) -> None:
-        async def end() -> None:
-            server = getattr(self, "_server", None)
-            if server is not None:
-                server.close()
-                await server.wait_closed()
-            await self._loop.shutdown_default_executor()
-
-        with suppress(TimeoutError):
-            asyncio.run_coroutine_threadsafe(end(), self._loop).result(_START_SECONDS)
-        self._handlers.shutdown(wait=False, cancel_futures=True)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(_START_SECONDS)
-        self._loop.close()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exc: object) -> None:
         self.close()
-
-
-_quiet = logging.getLogger("rosz.websocket")
-_quiet.addHandler(logging.NullHandler())
-_quiet.propagate = False
-
-
-def _place(connection: Any) -> str:
-    address = connection.remote_address
-    return f"{address[0]} port {address[1]}" if address else "an unknown address"
