@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import http
+import itertools
 import logging
 import ssl
 import threading
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -19,12 +20,13 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import Server, ServerConnection
     from websockets.http11 import Request, Response
 
-__all__ = ("Listener", "place")
+__all__ = ("Listener", "pieces", "place")
 
 T = TypeVar("T")
 
 _HANDLERS = 16
 _SECONDS = 10.0
+_PIECE = 1 << 18
 
 
 class Listener:
@@ -160,6 +162,22 @@ class Listener:
 _quiet = logging.getLogger("rosz.bridges.clients")
 _quiet.addHandler(logging.NullHandler())
 _quiet.propagate = False
+
+
+def pieces(data: bytes, head: bytes = b"") -> bytes | Iterator[bytes | memoryview]:
+    """Return a message as websockets send it with the fewest copies: in pieces if it is large.
+
+    What a socket does not take at once is copied, several times.
+
+    Args:
+        data: The message.
+        head: Bytes that stand before it.
+    """
+    if len(data) <= _PIECE:
+        return head + data
+    view = memoryview(data)
+    rest = (view[at : at + _PIECE] for at in range(_PIECE, len(data), _PIECE))
+    return itertools.chain((head + view[:_PIECE],), rest)
 
 
 def place(connection: ServerConnection) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from rosz.bridges.foxglove import protocol
+from rosz.bridges.listener import pieces
 from rosz.bridges.websocket import Feed, Message, Outbox, build
 from rosz.errors import RoszError, TypeNotFound, UsageError
 
@@ -181,14 +182,14 @@ class Connection:
             raise UsageError(f"this bridge does not offer '{capability}'")
         return handler
 
-    def encode(self, message: Message, feed: Feed) -> bytes:
+    def encode(self, message: Message, feed: Feed) -> bytes | Iterator[bytes | memoryview]:
         """Return a message of a topic as it is sent.
 
         Raises:
             DecodeError: It is no time, though it comes on ``/clock``.
         """
         if isinstance(feed, _Watched):
-            return protocol.data_frame(feed.subscription, message.received, message.data)
+            return pieces(message.data, protocol.data_head(feed.subscription, message.received))
         from rosz.msgs.rosgraph_msgs.msg import Clock
 
         return protocol.time_frame(Clock.from_cdr(message.data).clock.to_nsec())

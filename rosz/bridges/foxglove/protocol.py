@@ -34,7 +34,7 @@ __all__ = (
     "UnsubscribeConnectionGraph",
     "UnsubscribeParameterUpdates",
     "asset_frame",
-    "data_frame",
+    "data_head",
     "op_name",
     "read",
     "refusal_frame",
@@ -226,9 +226,9 @@ def op_name(message: ClientMessage) -> str:
     return str(message.__struct_config__.tag)
 
 
-def data_frame(subscription: int, time_ns: int, data: bytes) -> bytes:
-    """Return a message of a channel, for a subscription."""
-    return struct.pack("<BIQ", _DATA, subscription, time_ns) + data
+def data_head(subscription: int, time_ns: int) -> bytes:
+    """Return what stands before a message of a channel, for a subscription."""
+    return struct.pack("<BIQ", _DATA, subscription, time_ns)
 
 
 def time_frame(time_ns: int) -> bytes:

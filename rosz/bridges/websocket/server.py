@@ -14,7 +14,7 @@ import msgspec
 
 from rosz.bridges.admission import Admission
 from rosz.bridges.gate import Gate
-from rosz.bridges.listener import Listener, place
+from rosz.bridges.listener import Listener, pieces, place
 from rosz.bridges.websocket.actions import Gateways
 from rosz.bridges.websocket.connection import Connection, Shared
 from rosz.bridges.websocket.operations import fragments, png
@@ -209,7 +209,9 @@ class WebsocketBridge:
                 elif feed is not None:
                     numbers += 1
                     for frame in await self._encode(item, feed, numbers):
-                        await websocket.send(frame, text=not feed.form[0].startswith("cbor"))
+                        await websocket.send(
+                            pieces(frame), text=not feed.form[0].startswith("cbor")
+                        )
 
     async def _encode(self, message: Message, feed: Any, number: int) -> list[bytes]:
         """Return the frames of a message; none if it cannot be encoded."""
