@@ -65,11 +65,10 @@ def _message(cls: Any, owner: str, spelling: Spelling, tag: Any, space: Any) -> 
 def _value(slot: Slot, value: str, spelling: Spelling, tag: Any, space: Any) -> str:
     kind: Any = slot.kind
     if not isinstance(kind, str):
-        if slot.shape == "one":
-            return _message(kind, value, spelling, tag, space)
-        name = f"f{len(space)}"
-        space[name] = _compiled(kind, spelling, tag)
-        return f"[{name}(one) for one in {value}]"
+        return _nested(slot, value, spelling, tag, space)
+    if kind == "byte" and spelling == "ros1":  # an int8 there
+        one = "(one & 255 ^ 128) - 128"
+        return f"[{one} for one in {value}]" if slot.shape != "one" else one.replace("one", value)
     if slot.shape == "one":
         return value
     if kind in _BINARY:
@@ -78,6 +77,15 @@ def _value(slot: Slot, value: str, spelling: Spelling, tag: Any, space: Any) -> 
         code = ARRAY_CODES[kind]
         return f"tag({_TAGS[code]}, packed({value}, {code!r}))"
     return f"items({value})"
+
+
+def _nested(slot: Slot, value: str, spelling: Spelling, tag: Any, space: Any) -> str:
+    kind: Any = slot.kind
+    if slot.shape == "one":
+        return _message(kind, value, spelling, tag, space)
+    name = f"f{len(space)}"
+    space[name] = _compiled(kind, spelling, tag)
+    return f"[{name}(one) for one in {value}]"
 
 
 def _items(value: Any) -> list[Any]:

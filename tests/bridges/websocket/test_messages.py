@@ -18,7 +18,7 @@ from rosz.message import INTEGER_RANGES, Message, slots
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import PoseStamped
 from rosz.msgs.sensor_msgs.msg import Image, LaserScan, PointCloud2
-from rosz.msgs.std_msgs.msg import Header, Int8, UInt64
+from rosz.msgs.std_msgs.msg import Byte, ByteMultiArray, Header, Int8, UInt64
 
 NOW = 5_000_000_007
 
@@ -126,3 +126,11 @@ def test_null_is_nan() -> None:
     ranges = build_from_json(LaserScan, raw, "ros1", NOW).ranges
     assert ranges[0] == 1
     assert math.isnan(ranges[1])
+
+
+def test_a_byte_is_signed_in_ros1() -> None:
+    for cls, plain in ((Byte, {"data": -127}), (ByteMultiArray, {"data": [-128, 0, 127]})):
+        made = build_from_json(cls, msgspec.Raw(msgspec.json.encode(plain)), "ros1", NOW)
+        message = cls.from_cdr(made.to_cdr())
+        assert converter(cls, "ros1")(message)["data"] == plain["data"]
+    assert converter(Byte, "ros2")(Byte(200)) == {"data": 200}
