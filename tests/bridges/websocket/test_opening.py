@@ -141,4 +141,3 @@ def test_launch_files(network: Network) -> None:
         assert got["values"] == {"topic_name": "/tf_repub_1"}
         client.send("subscribe", topic="/odom", type="std_msgs/String")
         assert "patterns of this bridge" in joined(client)
-    assert len(graph.refresh().servers("/republish_tfs")) == 1
