@@ -410,7 +410,8 @@ class BagFiles:
             if self._closed:
                 return
             self._writer.start_flush()
-            over = self._start and now - self._start >= self._options.duration
+            self._start = self._start or now
+            over = now - self._start >= self._options.duration
             if self._options.duration and over and not self._options.split:
                 self.finished.set()
 

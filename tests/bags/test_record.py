@@ -324,6 +324,12 @@ def test_the_command(network: Network) -> None:
         assert not reader.problems
 
 
+def test_the_duration_ends_a_bag_without_messages(network: Network) -> None:
+    assert record(network, "/none", "--duration", "0.1", "-O", "none").exit_code() == 0
+    with open_reader(network.folder / "none.mcap") as reader:
+        assert (reader.count(), reader.indexed) == (0, True)
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
