@@ -120,6 +120,7 @@ def play(
         "seconds": round(elapsed, 2),
         "CPU seconds": round(used, 2),
         "received": received,
+        "received/s": round(received / elapsed),
         "of": 3 * COUNT,
         "load": round(os.getloadavg()[0], 1),
     }
