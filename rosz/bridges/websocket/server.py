@@ -205,7 +205,7 @@ class WebsocketBridge:
                     with suppress(TimeoutError):
                         await asyncio.wait_for(wanted.wait(), min(delay, 3600.0))
                 elif isinstance(item, bytes):
-                    await websocket.send(item, text=True)
+                    await websocket.send(pieces(item), text=True)
                 elif feed is not None:
                     numbers += 1
                     for frame in await self._encode(item, feed, numbers):

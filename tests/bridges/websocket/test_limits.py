@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from queue import SimpleQueue
 from typing import Any
 
+import cbor2
 import pytest
 from network import TIMEOUT, Network, eventually
 from websockets.exceptions import ConnectionClosed
@@ -135,6 +136,23 @@ def test_calls_that_do_not_end(network: Network) -> None:
         assert refused["values"].endswith("have not ended; wait for answers")
         go_on.set()
         assert {client.receive_op("service_response")["id"] for _ in range(2)} == {0, 1}
+        client.sync()
+
+
+@system
+@pytest.mark.parametrize("compression", ["none", "cbor"])
+def test_a_long_message_goes_in_frames(bridge: Bridge, compression: str) -> None:
+    """What waits in the buffer of a socket is one of them."""
+    node = bridge.network.node("other")
+    node.publisher("image", Image, latch=True).publish(Image(data=bytes(1_000_000)))
+    with bridge.client() as client:
+        subscribe = {"type": "sensor_msgs/Image", "compression": compression}
+        client.send("subscribe", topic="/image", **subscribe)
+        pieces = list(client.connection.recv_streaming(decode=False))
+        assert len(pieces) > 1
+        whole = b"".join(pieces)
+        read = json.loads if compression == "none" else cbor2.loads
+        assert len(read(whole)["msg"]["data"]) >= 1_000_000
         client.sync()
 
 
