@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -189,8 +190,18 @@ def tf_echo() -> None:
         TransformListener(buffer, node)
         buffer.wait(lambda: not buffer.why_not(source, target), _FIRST_TIMEOUT, node.clock)
         for _ in node.rate(rate):
-            sys.stdout.write(_echoed(buffer, source, target, node, precision))
-            sys.stdout.flush()
+            _print(_echoed(buffer, source, target, node, precision))
+
+
+def _print(text: str) -> None:
+    """Print a text; end the program if nobody reads its output any more."""
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Python flushes the output again at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
 
 
 def _echoed(buffer: Buffer, source: str, target: str, node: Node, precision: int) -> str:
@@ -217,8 +228,7 @@ def tf_monitor() -> None:
     with Node("tf_monitor", anonymous=True) as node:
         monitor = Monitor(node)
         while node.sleep(_MONITOR_SECONDS):
-            sys.stdout.write(_monitored(monitor, words, node.now()))
-            sys.stdout.flush()
+            _print(_monitored(monitor, words, node.now()))
 
 
 def _monitored(monitor: Monitor, words: Sequence[str], now: int) -> str:

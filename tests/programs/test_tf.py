@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from queue import SimpleQueue
 from typing import Any
 
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from network import TIMEOUT, Network, Program, eventually
 
 from rosz.errors import UsageError
+from rosz.msgs.geometry_msgs.msg import TransformStamped
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.programs.tf import leading_number, parse_transform
 from rosz.qos import QoS
@@ -19,6 +22,7 @@ from rosz.transforms import (
     Buffer,
     FrameReport,
     Monitor,
+    StaticTransformBroadcaster,
     TransformListener,
     from_rpy,
     to_rpy,
@@ -168,3 +172,28 @@ def test_buffer_server(network: Network) -> None:
     client = network.program(CLIENT)
     assert client.exit_code(40) == 0, client.output
     assert client.lines[-1] == "4.0"
+
+
+@pytest.mark.parametrize("program", [["tf_echo", "map", "base"], ["tf_monitor"]])
+def test_output_that_nobody_reads_ends_the_program(network: Network, program: list[str]) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "rosz", "run", "tf", *program, "_rate:=100"],
+        env=network.variables(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        try:
+            broadcaster = StaticTransformBroadcaster(network.node("robot"))
+            made = TransformStamped()
+            made.header.frame_id, made.child_frame_id = "map", "base"
+            made.transform.rotation.w = 1.0
+            broadcaster.send(made)
+            assert process.stdout is not None
+            assert process.stderr is not None
+            while not process.stdout.readline().strip():
+                pass
+            process.stdout.close()
+            assert process.wait(TIMEOUT) == 0
+            assert process.stderr.read() == b""
+        finally:
+            process.kill()
