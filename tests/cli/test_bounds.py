@@ -77,6 +77,8 @@ LINES = {
     "bag split --size {} a.bag": LIMITS,
     "bridge websocket --port {}": ["-1", "65536"],
     "bridge foxglove --port {}": ["-1", "65536"],
+    "graph --group {}": ["-1"],
+    "web --port {}": ["-1", "65536"],
 }
 
 
