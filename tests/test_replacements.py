@@ -57,11 +57,11 @@ def test_a_command_in_the_shell(network: Network) -> None:
 def test_a_command_that_the_machine_has_goes_first(network: Network) -> None:
     own = network.folder / "own"
     own.mkdir()
-    (own / "rviz").write_text("#!/bin/sh\necho the real one\n")
-    (own / "rviz").chmod(0o755)
-    done = evaluate(network, "rviz", ROSZ_PYTHON="", HOME=str(network.folder))
-    assert "rosz has no 'rviz'" in done.stderr
-    done = evaluate(network, f'PATH="{own}:$PATH"; eval "$({sys.executable} -m rosz env)"; rviz')
+    (own / "gazebo").write_text("#!/bin/sh\necho the real one\n")
+    (own / "gazebo").chmod(0o755)
+    done = evaluate(network, "gazebo", ROSZ_PYTHON="", HOME=str(network.folder))
+    assert "rosz has no 'gazebo'" in done.stderr
+    done = evaluate(network, f'PATH="{own}:$PATH"; eval "$({sys.executable} -m rosz env)"; gazebo')
     assert (done.stdout, done.stderr) == ("the real one\n", "")
 
 
@@ -79,7 +79,7 @@ def test_windows_of_rqt_are_pages(name: str, page: str) -> None:
     assert page in instead_of(name)
 
 
-@pytest.mark.parametrize("name", ["rviz", "image_view", "rqt_anything", "gazebo_ros"])
+@pytest.mark.parametrize("name", ["image_view", "rqt_anything", "gazebo_ros"])
 def test_a_program_of_a_package(network: Network, name: str) -> None:
     done = evaluate(network, f"rosrun {name} {name}")
     assert done.returncode == 1
