@@ -38,7 +38,8 @@ class Service(Entity):
     here and arrives at the caller as `ServiceError`; a handler that raises `ServiceError` itself
     refuses a request on purpose, and nothing is logged.
 
-    A ``number`` is that of the server within the session; by default one that was never used.
+    A ``number`` is that of the server within the session; by default one that was never used. Calls
+    of a ``rare`` one may wait a moment, and waiting for them costs less.
     """
 
     def __init__(
@@ -51,12 +52,14 @@ class Service(Entity):
         threads: int,
         *,
         number: int | None = None,
+        rare: bool = False,
     ) -> None:
         type_name, type_hash = service_type._type_name, service_type._type_hash
         super().__init__(node, Kind.SERVICE, name, type_name, type_hash, qos, number=number)
         self.service_type = service_type
         self._handler = handler
         self._decode = node.context.decoder(service_type.Request)
+        self._rare = rare
         self._open(threads)
         self.announce()
 
@@ -68,7 +71,8 @@ class Service(Entity):
         """
         if not isinstance(threads, int) or threads < 1:
             raise UsageError(f"threads is {threads!r}: expected 1 or more")
-        queryable = self.keep(self.node.context.session.pull_queryable(self.key, complete=True))
+        session = self.node.context.session
+        queryable = self.keep(session.pull_queryable(self.key, complete=True, rare=self._rare))
         Worker(f"rosz-srv{self.name}", self.serve, receive=queryable.receive, threads=threads)
 
     def serve(self, query: Query) -> None:

@@ -124,6 +124,7 @@ class ProvidedService:
                         SERVICES,
                         _THREADS,
                         number=identity.number,
+                        rare=True,  # each node of ROS 1 has two for its log
                     )
                 )
 

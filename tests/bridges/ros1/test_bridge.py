@@ -27,6 +27,7 @@ from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node
+from rosz.session.channels import declare
 from rosz.wire import Kind, Token
 
 from .world import LISTENER, SERVER, TALKER, World
@@ -349,6 +350,24 @@ def test_a_topic_that_nobody_uses_costs_no_thread(world: World, node: Node) -> N
         eventually(lambda: all(view().publishers(f"/many/t{number}") for number in range(20)))
         assert watches() == before
     eventually(lambda: "/many" not in view().nodes())
+
+
+def test_a_service_that_nobody_calls_wakes_no_thread(
+    world: World, node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each node of ROS 1 has two."""
+    waking: list[str] = []
+
+    def recorded(declaring: Any) -> Any:
+        waking.append(str(declaring))
+        return declare(declaring)
+
+    monkeypatch.setattr("rosz.session.session.declare", recorded)
+    program = world.rospy(LISTENER, "quiet", "/quiet")
+    names = [f"/quiet/{name}" for name in ("get_loggers", "set_logger_level")]
+    eventually(lambda: all(node.context.graph.view().servers(name) for name in names))
+    assert not [one for one in waking if "logger" in one]
+    program.send(signal.SIGINT)
 
 
 def test_a_node_gets_messages_when_its_answers_are_heard(world: World, node: Node) -> None:
