@@ -9,6 +9,11 @@ import pytest
 from .definitions import DEFINITIONS, KINDS, ROOT, Definition
 
 PACKAGES = sorted(path for path in ROOT.iterdir() if path.is_dir())
+PROGRAMS = {
+    ROOT / "rosapi" / "rosapi_node",
+    ROOT / "tf2_web_republisher" / "tf2_web_republisher",
+}
+"""Programs of packages that are named like their interfaces."""
 NAMES = {str(definition) for definition in DEFINITIONS}
 
 # What the code that ROS 2 generates for a service or an action draws in beside its own fields.
@@ -82,5 +87,7 @@ def test_folders_hold_nothing_else() -> None:
     files = {path for path in ROOT.rglob("*") if path.is_file()}
     expected = {definition.path for definition in DEFINITIONS}
     expected |= {package / "package.xml" for package in PACKAGES}
+    expected |= PROGRAMS
     assert files == expected
+    assert all(program.stat().st_mode & 0o111 for program in PROGRAMS)
     assert {definition.kind for definition in DEFINITIONS} == set(KINDS)
