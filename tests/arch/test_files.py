@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 
-from arch.house import HAND_WRITTEN, MODULES, assigned_names, is_package, path_of
+import pytest
 
+from arch.house import HAND_WRITTEN, MODULES, SOURCE, assigned_names, is_package, path_of
+
+TOP = {".ci", ".gitignore", "README.md", "interfaces", "launch", "pyproject.toml", "rosz", "tests"}
 LONGEST_FILE = 600
 LONGEST_FUNCTION = 50
 # Their exports are those of ROS.
@@ -26,6 +30,13 @@ def body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     if not body:
         return 0
     return (function.end_lineno or 0) - body[0].lineno + 1
+
+
+def test_the_top_level_holds_nothing_else() -> None:
+    if not (SOURCE.parent / ".git").exists():
+        pytest.skip("needs the git repository")
+    listing = subprocess.check_output(["git", "ls-files"], cwd=SOURCE.parent, text=True)
+    assert {line.partition("/")[0] for line in listing.splitlines()} == TOP
 
 
 def test_files_hold_one_idea() -> None:
