@@ -1,4 +1,4 @@
-"""What the settings of all bridges for websocket clients have in common."""
+"""What the settings of all servers for web clients have in common, and who may connect."""
 
 from __future__ import annotations
 
@@ -18,30 +18,25 @@ from rosz.bridges.admission import (
 )
 from rosz.bridges.gate import Gate, Pattern
 from rosz.errors import UsageError
+from rosz.security import Permit
 from rosz.session import keys_of
 
 if TYPE_CHECKING:
     from rosz.node import Node
 
-__all__ = ("BridgeSettings", "Entrance", "entrance")
+__all__ = ("Access", "BridgeSettings", "Entrance", "ServerSettings", "entrance", "grant_access")
 
 _LAST_PORT = 65535
 
 
-class BridgeSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """Settings of a bridge.
+class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """Settings of a server.
 
     Attributes:
         port: Port to listen at; 0 for any.
         host: Address to listen at. Beyond this machine, clients need a password.
         password_file: File whose first line is the password; empty for a random one.
-        authenticate: Whether clients need a password also on this machine.
-        origins: Origins of pages that may connect without a password.
         read_only: Whether clients change nothing.
-        topics: Patterns of the topics that clients see.
-        services: Patterns of the services.
-        params: Patterns of the parameters.
-        published: Patterns of the topics that clients publish.
         certificate: Certificate for TLS, instead of that of the keys.
         key: Its private key.
     """
@@ -49,52 +44,124 @@ class BridgeSettings(msgspec.Struct, frozen=True, kw_only=True):
     port: int
     host: str = "127.0.0.1"
     password_file: str = ""
-    authenticate: bool = False
-    origins: tuple[str, ...] = ()
     read_only: bool = False
-    topics: tuple[Pattern, ...] = ()
-    services: tuple[Pattern, ...] = ()
-    params: tuple[Pattern, ...] = ()
-    published: tuple[Pattern, ...] = ()
     certificate: str = ""
     key: str = ""
 
 
-class Entrance(msgspec.Struct, frozen=True):
-    """The conditions under which clients connect, and what they may do.
+class BridgeSettings(ServerSettings, frozen=True, kw_only=True):
+    """Settings of a bridge.
 
     Attributes:
-        gate: Permissions of the clients.
-        admission: Conditions under which they may connect.
-        tls: Settings of TLS, if links are encrypted.
-        shown: Whether the password is part of the address, as no file has it.
+        authenticate: Whether clients need a password also on this machine.
+        origins: Origins of pages that may connect without a password.
+        topics: Patterns of the topics that clients see.
+        services: Patterns of the services.
+        params: Patterns of the parameters.
+        published: Patterns of the topics that clients publish.
     """
 
-    gate: Gate
-    admission: Admission
-    tls: ssl.SSLContext | None
-    shown: bool
+    authenticate: bool = False
+    origins: tuple[str, ...] = ()
+    topics: tuple[Pattern, ...] = ()
+    services: tuple[Pattern, ...] = ()
+    params: tuple[Pattern, ...] = ()
+    published: tuple[Pattern, ...] = ()
 
-    def describe(self, clients: str, host: str, port: int) -> list[str]:
-        """Return lines that say where clients connect to.
+
+class Access(msgspec.Struct, frozen=True):
+    """Who may connect to a server, and how.
+
+    Attributes:
+        host: Address that it listens at.
+        password: The password of the clients; empty if they need none.
+        shown: Whether the password is part of the address, as no file has it.
+        tls: Settings of TLS, if links are encrypted.
+        permit: Permissions of the clients by the rules of the machine; None without rules.
+    """
+
+    host: str
+    password: str
+    shown: bool
+    tls: ssl.SSLContext | None
+    permit: Permit | None
+
+    def describe(self, protocol: str, port: int) -> list[str]:
+        """Return the address of the server, and lines that say more.
 
         Args:
-            clients: The clients, as in ``rosbridge clients connect``.
-            host: Address that the bridge listens at.
+            protocol: ``ws`` or ``http``.
             port: Port that it listens at.
         """
-        everywhere = host in {"0.0.0.0", "::", ""}  # noqa: S104  # it is compared
-        name = socket.gethostname() if everywhere else host
-        scheme = "ws" if self.tls is None else "wss"
+        everywhere = self.host in {"0.0.0.0", "::", ""}  # noqa: S104  # it is compared
+        name = socket.gethostname() if everywhere else self.host
+        scheme = protocol if self.tls is None else f"{protocol}s"
         address = f"{scheme}://{f'[{name}]' if ':' in name else name}:{port}"
-        if self.shown:
-            address += f"/?token={self.admission.password}"
-        lines = [f"{clients} to {address}"]
-        if self.admission.password and self.tls is None and not is_loopback(host):
+        lines = [f"{address}/?token={self.password}" if self.shown else address]
+        if self.password and self.tls is None and not is_loopback(self.host):
             lines.append(
                 "the password is sent unencrypted; keys (ROSZ_KEYS) or --certificate change that"
             )
         return lines
+
+
+def grant_access(
+    node: Node, settings: ServerSettings, holder: str, *, authenticate: bool = False
+) -> Access:
+    """Return who may connect, by settings and the keys of the machine.
+
+    Args:
+        node: Node of the server.
+        settings: The settings.
+        holder: Name of the clients in the rules of the machine.
+        authenticate: Whether clients need a password also on this machine.
+
+    Raises:
+        UsageError: A setting is not valid.
+    """
+    if not 0 <= settings.port <= _LAST_PORT:
+        raise UsageError(f"port {settings.port}: expected 0 to {_LAST_PORT}")
+    if bool(settings.certificate) != bool(settings.key):
+        raise UsageError("a certificate for TLS and its private key go together: give both")
+    local = is_loopback(settings.host)
+    keys = keys_of(node.context.environment)
+    password = ""
+    if settings.password_file:
+        password = read_password(Path(settings.password_file))
+    elif authenticate or not local:
+        password = new_password()
+    rules = keys.rules if keys else None
+    return Access(
+        settings.host,
+        password,
+        bool(password) and not settings.password_file,
+        server_tls(None if local else keys, settings.certificate, settings.key),
+        None if rules is None else rules.permit_at_bridge(holder),
+    )
+
+
+class Entrance(msgspec.Struct, frozen=True):
+    """The conditions under which clients of a bridge connect, and what they may do.
+
+    Attributes:
+        access: Who may connect, and how.
+        gate: Permissions of the clients.
+        admission: Conditions under which they may connect.
+    """
+
+    access: Access
+    gate: Gate
+    admission: Admission
+
+    def describe(self, clients: str, port: int) -> list[str]:
+        """Return lines that say where clients connect to.
+
+        Args:
+            clients: The clients, as in ``rosbridge clients connect``.
+            port: Port that the bridge listens at.
+        """
+        address, *more = self.access.describe("ws", port)
+        return [f"{clients} to {address}", *more]
 
 
 def entrance(
@@ -111,29 +178,13 @@ def entrance(
     Raises:
         UsageError: A setting is not valid.
     """
-    if not 0 <= settings.port <= _LAST_PORT:
-        raise UsageError(f"port {settings.port}: expected 0 to {_LAST_PORT}")
-    if bool(settings.certificate) != bool(settings.key):
-        raise UsageError("a certificate for TLS and its private key go together: give both")
-    local = is_loopback(settings.host)
-    keys = keys_of(node.context.environment)
-    password = ""
-    if settings.password_file:
-        password = read_password(Path(settings.password_file))
-    elif settings.authenticate or not local:
-        password = new_password()
-    rules = keys.rules if keys else None
+    access = grant_access(node, settings, holder, authenticate=settings.authenticate)
     gate = Gate(
-        None if rules is None else rules.permit_at_bridge(holder),
+        access.permit,
         settings.read_only,
         settings.topics,
         settings.services,
         settings.params,
         settings.published,
     )
-    return Entrance(
-        gate,
-        Admission(password, (*origins, *settings.origins)),
-        server_tls(None if local else keys, settings.certificate, settings.key),
-        bool(password) and not settings.password_file,
-    )
+    return Entrance(access, gate, Admission(access.password, (*origins, *settings.origins)))

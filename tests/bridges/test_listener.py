@@ -12,9 +12,7 @@ import pytest
 from network import Network
 
 from rosz.bridges import foxglove, websocket
-from rosz.bridges.admission import Admission
-from rosz.bridges.gate import Gate
-from rosz.bridges.opening import Entrance
+from rosz.bridges.opening import Access
 from rosz.errors import TransportError, UsageError
 
 pytestmark = pytest.mark.system
@@ -59,6 +57,6 @@ def test_settings(network: Network, monkeypatch: pytest.MonkeyPatch, package: An
 )
 def test_addresses(host: str, password: str, address: str, *, tls: bool, shown: bool) -> None:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER) if tls else None
-    lines = Entrance(Gate(), Admission(password), context, shown).describe("x connects", host, 80)
-    assert lines[0] == f"x connects to {address}"
+    lines = Access(host, password, shown, context, None).describe("ws", 80)
+    assert lines[0] == address
     assert len(lines) == 1 + bool(password and not tls and host != "127.0.0.1")

@@ -50,8 +50,8 @@ def open_bridge(node: Node, settings: Settings) -> tuple[FoxgloveBridge, list[st
         settings.port,
         gate=conditions.gate,
         admission=conditions.admission,
-        tls=conditions.tls,
+        tls=conditions.access.tls,
         limits=settings.limits,
         offer=settings.offer,
     )
-    return bridge, conditions.describe("Foxglove connects", settings.host, bridge.port)
+    return bridge, conditions.describe("Foxglove connects", bridge.port)

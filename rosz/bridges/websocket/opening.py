@@ -48,8 +48,8 @@ def open_bridge(node: Node, settings: Settings) -> tuple[WebsocketBridge, list[s
         settings.port,
         gate=conditions.gate,
         admission=conditions.admission,
-        tls=conditions.tls,
+        tls=conditions.access.tls,
         spelling=settings.spelling,
         limits=Limits(fragment_size=settings.fragment_size),
     )
-    return bridge, conditions.describe("rosbridge clients connect", settings.host, bridge.port)
+    return bridge, conditions.describe("rosbridge clients connect", bridge.port)

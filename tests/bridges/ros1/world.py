@@ -87,7 +87,7 @@ def roscpp(
     source = folder / f"{name}.cpp"
     files = [] if interfaces is None else sorted(interfaces.glob("*/*.[ms][sr][gv]"))
     if files and not _GENCPP.exists():
-        pytest.skip("needs gencpp (Debian: gencpp)")
+        pytest.skip("needs gencpp (Debian: python3-gencpp)")
     versions = subprocess.check_output(["pkg-config", "--modversion", *ask[3:]])
     versions += subprocess.check_output(["g++", "-dumpfullversion"])
     content = source.read_bytes() + versions + flags.stdout.encode()
