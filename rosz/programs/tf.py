@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from rosz.errors import RoszError, TransformError, UsageError
 from rosz.message.convert import from_plain
@@ -40,6 +40,7 @@ __all__ = (
 
 _NANOSECONDS = 1_000_000_000
 _LEADING_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_WRONG_WORDS = 255
 _MILLISECONDS = 1000
 _EULER, _QUATERNION = 6, 7
 _FIRST_TIMEOUT = _NANOSECONDS
@@ -65,6 +66,12 @@ _MONITOR_USAGE = "usage: tf_monitor [FRAME FRAME]"
 def _words() -> list[str]:
     """Return the command line without remappings and parameters."""
     return [word for word in sys.argv[1:] if ":=" not in word]
+
+
+def _refuse(text: str) -> NoReturn:
+    """End with the exit code of the programs of ROS 1 for wrong words."""
+    sys.stderr.write(f"{text}\n")
+    sys.exit(_WRONG_WORDS)
 
 
 def _numbers(words: Sequence[str], read: Callable[[str], float] = float) -> list[float]:
@@ -132,7 +139,7 @@ def static_transform_publisher() -> None:
         transform = parse_transform(words[:-1], leading_number)
         period = _positive("the period in ms", words[-1]) / _MILLISECONDS
     except UsageError as error:
-        sys.exit(f"static_transform_publisher: {error}\n{_TF_USAGE}")
+        _refuse(f"static_transform_publisher: {error}\n{_TF_USAGE}")
     with Node("static_transform_publisher", anonymous=True) as node:
         serve_loggers(node)
         broadcaster = TransformBroadcaster(node)
@@ -156,7 +163,7 @@ def static_transform_publisher_of_tf2() -> None:
                 else parse_transform(words, leading_number)
             )
         except RoszError as error:
-            sys.exit(f"static_transform_publisher: {error}\n{_TF2_USAGE}")
+            _refuse(f"static_transform_publisher: {error}\n{_TF2_USAGE}")
         transform.header.stamp = Time.from_nsec(node.now())
         StaticTransformBroadcaster(node).send(transform)
         node.log.info(
@@ -184,7 +191,7 @@ def tf_echo() -> None:
             source, target, *rest = (word.removeprefix("/") for word in _few(words))
             rate = _positive("the rate", *rest or [str(node.params.get("~rate", 1.0))])
         except UsageError as error:
-            sys.exit(f"tf_echo: {error}\n{_ECHO_USAGE}")
+            _refuse(f"tf_echo: {error}\n{_ECHO_USAGE}")
         precision = int(node.params.get("~precision", 3))
         buffer = Buffer()
         TransformListener(buffer, node)
@@ -224,7 +231,7 @@ def tf_monitor() -> None:
     """Print again and again by whom, how often and how late frames are published."""
     words = [word.removeprefix("/") for word in _words()]
     if len(words) not in {0, 2}:
-        sys.exit(f"tf_monitor: expected no frames or two\n{_MONITOR_USAGE}")
+        _refuse(f"tf_monitor: expected no frames or two\n{_MONITOR_USAGE}")
     with Node("tf_monitor", anonymous=True) as node:
         monitor = Monitor(node)
         while node.sleep(_MONITOR_SECONDS):
