@@ -419,8 +419,14 @@ def test_nobody_there(scene: Scene) -> None:
 
 
 def test_nobody_else_reaches_an_agent(scene: Scene) -> None:
-    run = scene.launch(SLEEPER.format(""))
-    run.wait_for("asleep on robot")
+    """Nodes not in Python would have a master of ROS 1 there, which is part of the network."""
+    script = scene.robot.home / "src/tools/sleeper.py"
+    script.write_text(
+        "#!/usr/bin/env python3\nimport time\nprint('asleep', flush=True)\ntime.sleep(1000)\n"
+    )
+    script.chmod(0o755)
+    run = scene.launch(SLEEPER.format("").replace("sleeper.sh", "sleeper.py"))
+    run.wait_for("asleep")
     assert scene.robot.listening() == ["0.0.0.0:22", "[::]:22"]
     assert scene.laptop.listening() == []
     ports = scene.robot.run("ss", "-Hlntx")

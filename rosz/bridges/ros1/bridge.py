@@ -32,7 +32,6 @@ MASTER_PORT = 11311
 
 _PROBE_SECONDS = 3.0
 _PROBE_TIMEOUT = 2.0
-_SAVE_SECONDS = 0.2
 
 
 def running_master(environ: Mapping[str, str]) -> str:
@@ -133,7 +132,7 @@ class MasterBridge:
         self._mirror.apply(changes)
         if not self._saving:
             self._saving = True
-            self._shared.changes.later(_SAVE_SECONDS, self._save)
+            self._shared.changes.submit(self._save)
 
     # Nodes that have ended.
 
