@@ -343,6 +343,8 @@ class TestLatched:
         publisher = chatter(talker, latch=True)
         subscription = listener.subscription("chatter", String)
         publisher.wait_for_subscribers()
+        publisher.publish("first")
+        assert subscription.get().data == "first"  # what was in the cache has been asked for
         for text in ("one", "two"):
             publisher.publish(text)
         assert subscription.get().data == "one"
