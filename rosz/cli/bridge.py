@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack
-from typing import Annotated
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from typing import Annotated, NoReturn
 
 from rosz.cli.console import print_lines, until_stopped
 from rosz.cli.core import open_master, read_master_place
@@ -17,6 +18,23 @@ app = App("Let programs that speak other protocols take part in the network.")
 
 _LONG = 3600.0
 _LAST_PORT = 65535
+
+_Listen = Annotated[str, Option("--listen ADDRESS", "Address to listen at, instead of 127.0.0.1.")]
+_PasswordFile = Annotated[
+    str, Option("--password-file FILE", "File whose first line clients must know.")
+]
+_ReadOnly = Annotated[bool, Option("--read-only", "Let clients change nothing.")]
+_Topics = Annotated[
+    list[str] | None, Option("--topics PATTERN", "Topics that clients see; repeatable.")
+]
+_Services = Annotated[
+    list[str] | None, Option("--services PATTERN", "Services that clients see; repeatable.")
+]
+_Params = Annotated[
+    list[str] | None, Option("--params PATTERN", "Parameters that clients see; repeatable.")
+]
+_Certificate = Annotated[str, Option("--certificate FILE", "Certificate for TLS.")]
+_Key = Annotated[str, Option("--key FILE", "Private key of the certificate.")]
 
 
 @app.command("ros1")
@@ -68,41 +86,28 @@ def ros1_command(
                 AttachedBridge(master, environment, choice=choice, namespace=namespace)
             )
             lines = [f"joining the roscore at {master}"]
-        ready()
-        print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
-        while True:
-            time.sleep(_LONG)
+        _run(ready, lines)
 
 
 @app.command("websocket")
 def websocket_command(
     *,
     port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 9090,
-    listen: Annotated[
-        str, Option("--listen ADDRESS", "Address to listen at, instead of 127.0.0.1.")
-    ] = "127.0.0.1",
-    password_file: Annotated[
-        str, Option("--password-file FILE", "File whose first line clients must know.")
-    ] = "",
+    listen: _Listen = "127.0.0.1",
+    password_file: _PasswordFile = "",
     origin: Annotated[
         list[str] | None,
         Option("--origin ORIGIN", "Pages that may connect, such as http://robot; repeatable."),
     ] = None,
-    read_only: Annotated[bool, Option("--read-only", "Let clients change nothing.")] = False,
-    topics: Annotated[
-        list[str] | None, Option("--topics PATTERN", "Topics that clients see; repeatable.")
-    ] = None,
-    services: Annotated[
-        list[str] | None, Option("--services PATTERN", "Services that clients see; repeatable.")
-    ] = None,
-    params: Annotated[
-        list[str] | None, Option("--params PATTERN", "Parameters that clients see; repeatable.")
-    ] = None,
+    read_only: _ReadOnly = False,
+    topics: _Topics = None,
+    services: _Services = None,
+    params: _Params = None,
     ros2: Annotated[
         bool, Option("--ros2", "Use ROS 2's spelling with clients that have not shown theirs.")
     ] = False,
-    certificate: Annotated[str, Option("--certificate FILE", "Certificate for TLS.")] = "",
-    key: Annotated[str, Option("--key FILE", "Private key of the certificate.")] = "",
+    certificate: _Certificate = "",
+    key: _Key = "",
 ) -> None:
     """Serve the rosbridge protocol to web pages and other programs, until it is stopped."""
     at_least("--port", port, 0, "as a port", _LAST_PORT)
@@ -122,42 +127,28 @@ def websocket_command(
         certificate=certificate,
         key=key,
     )
-    with until_stopped() as ready, ExitStack() as stack:
-        node = stack.enter_context(Node("rosbridge_websocket", anonymous=True, argv=()))
+    with until_stopped() as ready, Node("rosbridge_websocket", anonymous=True, argv=()) as node:
         bridge, lines = open_bridge(node, settings)
-        stack.callback(bridge.close)
-        ready()
-        print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
-        while True:
-            time.sleep(_LONG)
+        with closing(bridge):
+            _run(ready, lines)
 
 
 @app.command("foxglove")
 def foxglove_command(
     *,
     port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 8765,
-    listen: Annotated[
-        str, Option("--listen ADDRESS", "Address to listen at, instead of 127.0.0.1.")
-    ] = "127.0.0.1",
-    password_file: Annotated[
-        str, Option("--password-file FILE", "File whose first line clients must know.")
-    ] = "",
+    listen: _Listen = "127.0.0.1",
+    password_file: _PasswordFile = "",
     origin: Annotated[
         list[str] | None,
         Option("--origin ORIGIN", "Pages that may connect, beside Foxglove's; repeatable."),
     ] = None,
-    read_only: Annotated[bool, Option("--read-only", "Let clients change nothing.")] = False,
-    topics: Annotated[
-        list[str] | None, Option("--topics PATTERN", "Topics that clients see; repeatable.")
-    ] = None,
-    services: Annotated[
-        list[str] | None, Option("--services PATTERN", "Services that clients see; repeatable.")
-    ] = None,
-    params: Annotated[
-        list[str] | None, Option("--params PATTERN", "Parameters that clients see; repeatable.")
-    ] = None,
-    certificate: Annotated[str, Option("--certificate FILE", "Certificate for TLS.")] = "",
-    key: Annotated[str, Option("--key FILE", "Private key of the certificate.")] = "",
+    read_only: _ReadOnly = False,
+    topics: _Topics = None,
+    services: _Services = None,
+    params: _Params = None,
+    certificate: _Certificate = "",
+    key: _Key = "",
 ) -> None:
     """Serve Foxglove, Lichtblick and other viewers, until it is stopped."""
     at_least("--port", port, 0, "as a port", _LAST_PORT)
@@ -176,11 +167,15 @@ def foxglove_command(
         certificate=certificate,
         key=key,
     )
-    with until_stopped() as ready, ExitStack() as stack:
-        node = stack.enter_context(Node("foxglove_bridge", anonymous=True, argv=()))
+    with until_stopped() as ready, Node("foxglove_bridge", anonymous=True, argv=()) as node:
         bridge, lines = open_bridge(node, settings)
-        stack.callback(bridge.close)
-        ready()
-        print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
-        while True:
-            time.sleep(_LONG)
+        with closing(bridge):
+            _run(ready, lines)
+
+
+def _run(ready: Callable[[], None], lines: list[str]) -> NoReturn:
+    """Print the first lines of a bridge, and wait until it is stopped."""
+    ready()
+    print_lines([*lines, "started the bridge; press Ctrl-C to end it"])
+    while True:
+        time.sleep(_LONG)
