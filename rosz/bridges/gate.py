@@ -73,7 +73,7 @@ class Gate(msgspec.Struct, frozen=True):
 
 
 def matches(patterns: tuple[Pattern, ...], name: str) -> bool:
-    """Return whether a name matches one of some patterns, or there are no patterns."""
+    """Return whether a name matches any of the patterns; without patterns, every name does."""
     return not patterns or any(
         fnmatch.fnmatchcase(name, one) if isinstance(one, str) else one.fullmatch(name) is not None
         for one in patterns

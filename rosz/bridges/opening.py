@@ -1,4 +1,4 @@
-"""What the settings of all servers for web clients have in common, and who may connect."""
+"""Settings that all servers for web clients share, and the access that they grant."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class BridgeSettings(ServerSettings, frozen=True, kw_only=True):
 
 
 class Access(msgspec.Struct, frozen=True):
-    """Who may connect to a server, and how.
+    """Conditions under which clients may connect to a server.
 
     Attributes:
         host: Address that it listens at.

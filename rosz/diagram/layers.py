@@ -30,7 +30,7 @@ _MOST_BENDS = 20_000
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a box is.
+    """Position and size of a box, in pixels.
 
     Attributes:
         box: The box.
@@ -48,7 +48,7 @@ class Place(msgspec.Struct, frozen=True):
 
 
 class Layout(msgspec.Struct, frozen=True):
-    """Where everything is.
+    """Positions of all boxes and arrows, in pixels.
 
     Attributes:
         places: The place of each box, by key.

@@ -1,4 +1,6 @@
-"""What is in the picture: nodes, topics, and who sends to whom; as rqt_graph chooses it.
+"""Boxes and arrows of the graph: nodes, topics and their connections.
+
+The options that select them are those of rqt_graph.
 
 A picture is a value: boxes and arrows. It is made from the tokens of a domain by options, and
 `rosz.diagram.layers` gives it a layout.
@@ -34,7 +36,7 @@ _PARAMETER_SERVICES = (
 
 
 class PictureOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """What a picture shows; the defaults are those of rqt_graph.
+    """Options of a picture; the defaults are those of rqt_graph.
 
     Attributes:
         content: ``nodes``, ``active`` for topics with both ends too, or ``all`` topics.
@@ -80,7 +82,7 @@ class Box(msgspec.Struct, frozen=True):
 
 
 class Arrow(msgspec.Struct, frozen=True):
-    """What flows from one box to another.
+    """An arrow from one box to another.
 
     Attributes:
         start: Key of the box that it begins at.

@@ -1,4 +1,4 @@
-"""What a watch of tokens reports, and when it has reported all that existed at its beginning."""
+"""Reports of a watch of tokens, and of the end of those that existed at its beginning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who may open the page: the same origin, and beyond this machine those who know the password.
+"""Access to the page: by origin, and from other machines by password.
 
 A browser sends the origin of the page that makes a request (``Origin``), and the host that it
 believes to talk to (``Host``). A page from elsewhere may neither send requests nor open the

@@ -36,9 +36,9 @@ _GID_AT: Final = 17
 _SIZE: Final = 33
 """The sizes of an attachment, without its id of a publisher and with it."""
 _TOKEN_SECONDS: Final = 2.0
-"""How long the first sample of a publisher without a token is held."""
+"""Seconds for which the first sample of a publisher waits for its token."""
 _PUBLISHERS: Final = 1000
-"""How many publishers are remembered that have gone or have no token."""
+"""Largest number of publishers in each memory: of those that have gone, and of the unknown."""
 _RESULT: Final = "/_action/get_result"
 
 
@@ -46,7 +46,7 @@ def prefix_frames(prefix: str, payload: bytes) -> bytes:
     """Return transforms with a prefix before each frame.
 
     Raises:
-        DecodeError: The bytes are no transforms.
+        DecodeError: The bytes do not encode transforms.
     """
     message = TFMessage._decode(payload)
     for transform in message.transforms:
@@ -60,7 +60,7 @@ def strip_frames(prefix: str, payload: bytes) -> bytes:
     """Return transforms whose frames have lost a prefix; others stay as they are.
 
     Raises:
-        DecodeError: The bytes are no transforms.
+        DecodeError: The bytes do not encode transforms.
     """
     start = f"{prefix}/"
     message = TFMessage._decode(payload)
@@ -99,7 +99,7 @@ class Ids:
                 _shorten(self._gone)
 
     def find(self, gid: bytes) -> bytes | None:
-        """Return the id on the other side; ``None`` if there is no such publisher.
+        """Return the id of a publisher on the other side, or None if the publisher is unknown.
 
         An unknown publisher gets 2 seconds to become known, but only once.
         """

@@ -48,7 +48,7 @@ class Assets:
 
         Raises:
             UsageError: Clients may not fetch it, or it cannot be read or is too large.
-            RoszError: There is no such package or file, or the path leads out of the package.
+            RoszError: The package or the file is not found, or the path leads out of the package.
         """
         if not any(pattern.fullmatch(uri) for pattern in self._allowed):
             raise UsageError(

@@ -186,7 +186,7 @@ class Connection:
         """Return a message of a topic as it is sent.
 
         Raises:
-            DecodeError: It is no time, though it comes on ``/clock``.
+            DecodeError: A message of ``/clock`` does not contain a time.
         """
         if isinstance(feed, _Watched):
             return pieces(message.data, protocol.data_head(feed.subscription, message.received))
@@ -239,7 +239,7 @@ class Connection:
             with self._lock:
                 feed = self._watched.pop(number, None)
             if feed is None:
-                raise UsageError(f"there is no subscription {number}")
+                raise UsageError(f"unknown subscription {number}")
             self._drop(feed)
 
     def drop_channels(self, channels: Iterable[int]) -> None:

@@ -23,7 +23,7 @@ class Settings(BridgeSettings, frozen=True, kw_only=True):
     """Settings of a bridge; Foxglove's own pages may always connect.
 
     Attributes:
-        limits: How much clients may take.
+        limits: Limits on the number of clients and on their messages.
         offer: What the bridge offers.
     """
 

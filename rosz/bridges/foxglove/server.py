@@ -44,7 +44,7 @@ _UNREAD = "answers wait that the client does not read"
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """How much clients may take.
+    """Limits on the number of clients and on their messages.
 
     Attributes:
         clients: Largest number of clients.
@@ -58,7 +58,7 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 class Offer(msgspec.Struct, frozen=True):
-    """What a bridge offers to its clients, within their permissions.
+    """Features and files that a bridge offers; permissions may restrict them further.
 
     Attributes:
         capabilities: Features, in the words of the protocol.
@@ -81,7 +81,7 @@ class FoxgloveBridge:
         gate: Permissions of the clients.
         admission: Conditions under which a client may connect.
         tls: Settings of TLS; without them, links are not encrypted.
-        limits: How much clients may take.
+        limits: Limits on the number of clients and on their messages.
         offer: What the bridge offers.
 
     Attributes:

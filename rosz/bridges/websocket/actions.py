@@ -167,7 +167,7 @@ class SentGoals:
         """Cancel a goal, also one that has not been accepted yet.
 
         Raises:
-            RoszError: There is no such goal, or the server did not answer.
+            RoszError: The goal is unknown, or the server did not answer.
         """
         key = str(operation.id)
         with self._lock:

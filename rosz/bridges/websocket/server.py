@@ -46,7 +46,7 @@ _LATE = "the password is missing"  # what a client is told
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """How much clients may take.
+    """Limits on the number of clients and on their messages.
 
     Attributes:
         clients: Largest number of clients.
@@ -78,7 +78,7 @@ class WebsocketBridge:
         admission: Conditions under which a client may connect.
         tls: Settings of TLS; without them, links are not encrypted.
         spelling: Whose names of types and fields a client gets that has not shown its own.
-        limits: How much clients may take.
+        limits: Limits on the number of clients and on their messages.
 
     Attributes:
         port: Port that it listens at.

@@ -1,4 +1,4 @@
-"""What those who use the page may change."""
+"""Permissions of those who use the page."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _CHANGES = frozenset({"publish", "call", "serve", "set"})
 
 
 class Permission(msgspec.Struct, frozen=True):
-    """What those who use the page may do.
+    """Permissions of those who use the page.
 
     Attributes:
         permit: Permissions by the rules of the machine; None without rules.

@@ -1,4 +1,4 @@
-"""What a page publishes: once, or at a rate until it stops or closes."""
+"""Publishing from a page: once, or at a rate until it stops or closes."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class GraphWatch:
 
 
 class System:
-    """What the pages show and change.
+    """The models that the pages share.
 
     Args:
         node: Node of the page. It is not closed with the system.

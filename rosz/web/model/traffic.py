@@ -34,7 +34,7 @@ _HEAVY = frozenset(
 
 
 class Flow(msgspec.Struct, frozen=True):
-    """What flows on a topic.
+    """Rate and bandwidth of a topic.
 
     Attributes:
         rate: Messages per second.

@@ -1,4 +1,4 @@
-"""What all pages have: the header, the navigation, light and dark, and errors in words."""
+"""The frame of all pages: header, navigation, light and dark colors, and error messages."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ class _Tiles:
 
 
 class _Doctor:
-    """What the doctor found."""
+    """The findings of the doctor."""
 
     def __init__(self, findings: Findings) -> None:
         self._findings = findings

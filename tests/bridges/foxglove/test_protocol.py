@@ -81,7 +81,7 @@ def test_channels_come_and_go(bridge: Bridge, client: Client) -> None:
     assert client.wait_op("unadvertise")["channelIds"] == [channel["id"]]
     assert client.wait_op("unadvertiseServices")["serviceIds"] == [flip["id"]]
     client.send("unsubscribe", subscriptionIds=[1])
-    assert client.wait_status() == "unsubscribe: there is no subscription 1"
+    assert client.wait_status() == "unsubscribe: unknown subscription 1"
     client.channels.clear()
     node.subscription("chatter", String, print)
     assert client.channel("/chatter")["id"] != channel["id"]
