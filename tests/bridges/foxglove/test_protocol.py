@@ -340,7 +340,7 @@ def test_messages_that_are_none(bridge: Bridge, client: Client) -> None:
         assert client.wait_status().startswith("message: ")
     for op, members, reason in (
         ("subscribe", {"subscriptions": [{"id": 1, "channelId": 999}]}, "no channel 999"),
-        ("unsubscribe", {"subscriptionIds": [5]}, "no subscription 5"),
+        ("unsubscribe", {"subscriptionIds": [5]}, "unknown subscription 5"),
         ("unadvertise", {"channelIds": [5]}, "channel 5 is not advertised"),
     ):
         client.send(op, **members)
