@@ -107,11 +107,21 @@ def test_a_plain_client_gets_no_further(pair: tuple[Host, Host], authority: Auth
     forger.say("go")
     forger.wait_for("done", 50)
     victim.wait_for("param /gains/p 77")
-    assert robot.ask("param", "get", "/secrets/pin") == "1234"
+    assert robot.ask("param", "get", "/secrets/pin") == "vault-4711"
     got = [line for line in victim.lines if line.startswith(("got", "served", "param /secrets"))]
     assert got == []
     print(forger.output)
-    for word in ("camera", "plan", "map", "lift", "format", "reset", "1234", "got a call", "@/"):
+    for word in (
+        "camera",
+        "plan",
+        "map",
+        "lift",
+        "format",
+        "reset",
+        "vault-4711",
+        "got a call",
+        "@/",
+    ):
         assert word not in forger.output
     eventually(lambda: robot.lists("/robot"), "the node")
 

@@ -26,7 +26,7 @@ with rosz.Node("victim") as node:
     odom = node.publisher("odom", String)
     node.subscription("cmd_vel", String, lambda message: print("got message", flush=True))
     node.service("reset", Trigger, serve)
-    node.params.set("/pin", 1234)
+    node.params.set("/pin", "vault-4711")
     node.params.watch("/", lambda change: print("got param", change.name, flush=True))
     print("up", flush=True)
     for tick in node.rate(20):
@@ -105,10 +105,10 @@ def assert_apart(robot: Host, laptop: Host) -> None:
     intruder = laptop.program(INTRUDER)
     intruder.wait_for("tried")
     assert "heard" not in intruder.output
-    assert "1234" not in intruder.output
+    assert "vault-4711" not in intruder.output
     assert nodes_seen_by(laptop) == ["/intruder"]
     assert nodes_seen_by(robot) == ["/victim"]
-    assert robot.ask("param", "get", "/pin").splitlines()[-1] == "1234"
+    assert robot.ask("param", "get", "/pin").splitlines()[-1] == "vault-4711"
     assert victim.output == "up"
 
 

@@ -25,7 +25,7 @@ ROBOT = """
 
     with rosz.Node("robot") as node:
         node.params.set("/gains/p", 1)
-        node.params.set("/secrets/pin", 1234)
+        node.params.set("/secrets/pin", "vault-4711")
         out = {name: node.publisher(name, String) for name in ("camera", "odom")}
         for name in ("map", "plan"):
             node.publisher(name, String, latch=True).publish(name)
@@ -148,12 +148,12 @@ def test_rules_allow_only_what_they_say(pair: Pair) -> None:
     laptop.say("call format")
     laptop.wait_for("error call format")
     laptop.say("get /secrets/pin")
-    laptop.wait_for("value 1234")
+    laptop.wait_for("value vault-4711")
     laptop.say("set /gains/p 7")
     robot.wait_for("param /gains/p 7")
     laptop.say("set /secrets/pin 0")
     laptop.wait_for("done set /secrets/pin", 30)
-    assert pair.robot.ask("param", "get", "/secrets/pin") == "1234"
+    assert pair.robot.ask("param", "get", "/secrets/pin") == "vault-4711"
     laptop.say("names")
     assert laptop.wait_for("robot has") == "robot has /cmd_vel /map /odom /reset"
     for unheard in ("lift", "secrets"):

@@ -75,7 +75,7 @@ def test_another_user_reaches_nothing(users: tuple[Host, User, User]) -> None:
     core.wait_for("listening on unixsock-stream//run/user/4001/rosz/z.sock")
     core.wait_for("started core")
     node = owner.node("publisher.py")
-    owner.ask("param", "set", "/pin", "1234")
+    owner.ask("param", "set", "/pin", "vault-4711")
     eventually(lambda: owner.ask("node", "list") == "/publisher", "the node")
     sockets = robot.run("find", owner.home, "-type", "s").split()
     assert len(sockets) >= 2  # of the core and of the node
@@ -93,7 +93,7 @@ def test_another_user_reaches_nothing(users: tuple[Host, User, User]) -> None:
         ):
             program = other.rosz(*command, ROSZ_RENDEZVOUS=place)
             assert program.exit_code(30) == 1, program.output
-            assert "1234" not in program.output
+            assert "vault-4711" not in program.output
             assert "chatter" not in program.output
     assert owner.ask("node", "list") == "/publisher"
     assert node.process.poll() is None

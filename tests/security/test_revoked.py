@@ -18,7 +18,7 @@ ROBOT = """
     import rosz
     from rosz.msgs.std_msgs.msg import String
     with rosz.Node("robot") as node:
-        node.params.set("/pin", 1234)
+        node.params.set("/pin", "vault-4711")
         node.subscription("cmd_vel", String, lambda m: print("got", m.data, flush=True))
         odom = node.publisher("odom", String)
         print("up", flush=True)
@@ -96,7 +96,7 @@ def test_a_live_link_ends_and_no_other_comes(fleet: Fleet) -> None:
     assert listing.exit_code(30) == 1
     assert "the keys of this machine may have been revoked" in listing.output
     assert fleet.sees_robot(fleet.desk)
-    assert fleet.robot.ask("param", "get", "/pin") == "1234"
+    assert fleet.robot.ask("param", "get", "/pin") == "vault-4711"
     fleet.authority.add("laptop", [fleet.laptop.address])
     fleet.laptop.variables["ROSZ_KEYS"] = str(fleet.authority.folder)
     assert fleet.sees_robot(fleet.laptop)
