@@ -11,12 +11,19 @@ from network import TIMEOUT, Network, eventually
 
 from rosz.errors import NotFoundError, UsageError, YamlError
 from rosz.introspect.rosout import LogFilter
-from rosz.msgs.geometry_msgs.msg import PoseStamped, Twist, Vector3
-from rosz.msgs.sensor_msgs.msg import Image
+from rosz.msgs.actionlib_msgs.msg import GoalStatus
+from rosz.msgs.geometry_msgs.msg import (
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Twist,
+    Vector3,
+)
+from rosz.msgs.sensor_msgs.msg import BatteryState, Image
 from rosz.msgs.std_msgs.msg import Float64MultiArray, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.web.model import (
     Driver,
+    Form,
     ImageWatch,
     LogBook,
     Parameters,
@@ -30,8 +37,8 @@ from rosz.web.model import (
     message_tree,
     split_fields,
 )
+from rosz.web.model.forms import FormField, form_fields, read_form
 from rosz.web.model.plotting import Series
-from rosz.web.model.sending import read_form
 
 
 def test_forms_have_all_fields_and_take_some() -> None:
@@ -41,6 +48,66 @@ def test_forms_have_all_fields_and_take_some() -> None:
     assert read_form(Twist, " ", 0) == Twist()
     with pytest.raises(UsageError, match="is not YAML"):
         read_form(Twist, "{linear: ", 0)
+
+
+def _fields(fields: tuple[FormField, ...]) -> dict[str, FormField]:
+    found = {".".join(one.path): one for one in fields}
+    for one in fields:
+        found |= _fields(one.fields)
+    return found
+
+
+def test_a_form_has_an_editor_for_each_type_of_field() -> None:
+    found = _fields(form_fields(PoseWithCovarianceStamped))
+    assert found["header.stamp"].kind == "yaml"
+    assert found["header.frame_id"].kind == "text"
+    assert found["pose.pose.position"].kind == "message"
+    assert found["pose.pose.position.x"].kind == "number"
+    assert found["pose.covariance"].kind == "yaml"
+    assert sum(one.size for one in form_fields(Twist)) == 6
+    battery = _fields(form_fields(BatteryState))
+    assert battery["present"].kind == "bool"
+    assert battery["present"].hint == "a battery is plugged in"
+    health = battery["power_supply_health"]
+    assert (health.kind, health.choices[2]) == ("choice", "POWER_SUPPLY_HEALTH_OVERHEAT")
+    status = _fields(form_fields(GoalStatus))["status"]
+    assert (status.kind, status.choices[3]) == ("choice", "SUCCEEDED")
+    pixels = _fields(form_fields(Image))["is_bigendian"]
+    assert (pixels.kind, pixels.low, pixels.high) == ("integer", 0, 255)
+
+
+def test_a_field_is_written_into_the_text_and_the_text_into_the_fields() -> None:
+    form = Form(Twist)
+    fields = _fields(form.fields)
+    form.write("{angular: {z: 2}}", 0)
+    assert form.value(fields["angular.z"]) == 2.0
+    assert form.value(fields["linear.x"]) == 0.0
+    assert form.change(fields["linear.x"], 1.5, 0) == ""
+    assert form.text == "linear: {x: 1.5}\nangular: {z: 2}"
+    assert read_form(Twist, form.text, 0) == Twist(Vector3(x=1.5), Vector3(z=2.0))
+    form.write("{linear: {x: much}}", 0)
+    assert "linear.x" in form.fault
+    assert "no field can be written" in form.change(fields["linear.x"], 2.0, 0)
+    assert form.text == "{linear: {x: much}}"
+
+
+def test_values_that_yaml_writes_otherwise_come_back() -> None:
+    form = Form(PoseStamped)
+    stamp, frame = (_fields(form.fields)[name] for name in ("header.stamp", "header.frame_id"))
+    assert form.value(stamp) == "{secs: 0, nsecs: 0}"
+    assert form.change(stamp, "now", 5 * 10**9) == ""
+    assert form.change(frame, "on", 5 * 10**9) == ""
+    assert form.value(stamp) == "now"
+    read = read_form(PoseStamped, form.text, 7 * 10**9)
+    assert (read.header.stamp.secs, read.header.frame_id) == (7, "on")
+    assert "<header.stamp>" in form.change(stamp, "{secs: ", 0)
+    assert form.value(stamp) == "now"
+    image = Form(Image)
+    fields = _fields(image.fields)
+    assert image.change(fields["data"], "[1, 2, 255]", 0) == ""
+    assert image.change(fields["height"], 3.0, 0) == ""
+    assert "0 to 4294967295" in image.change(fields["height"], -1, 0)
+    assert read_form(Image, image.text, 0) == Image(height=3, data=bytes([1, 2, 255]))
 
 
 def test_a_tree_is_cut_where_it_is_long() -> None:

@@ -163,7 +163,7 @@ def test_what_pages_do_arrives(world: World) -> None:
     world.send("linear: {x: 1.5}", "Publish once", lambda: "drives 1.5" in world.robot.output)
     world.send("linear: {x: much}", "Publish once", lambda: "linear.x" in world.text)
     world.open("/services?service=/enable")
-    world.should_hold("textarea", "data: False")
+    world.should_hold("textarea", "data: false")
     world.send("data: true", "Call", lambda: "is True" in world.text)
     world.open("/parameters")
     world.should_see("rate")

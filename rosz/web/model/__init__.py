@@ -4,16 +4,17 @@ What costs something is open only while a page uses it (`Shared`). Queues are bo
 newest wins. Pages read what they show at their own pace, so that a slow browser holds nothing up.
 """
 
-from rosz.web.model.calling import call_service
+from rosz.web.model.calling import call_service, service_type
 from rosz.web.model.console import LogBook
 from rosz.web.model.driving import Driver
 from rosz.web.model.findings import Findings
+from rosz.web.model.forms import Form, FormField, form_of
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
 from rosz.web.model.pictures import IMAGE_TYPES, ImageWatch, Pictures
 from rosz.web.model.plotting import Plot, split_fields
 from rosz.web.model.reconfiguring import Reconfiguration
-from rosz.web.model.sending import Sending, form_of
+from rosz.web.model.sending import Sending
 from rosz.web.model.sharing import Shared
 from rosz.web.model.system import System
 from rosz.web.model.topic import TopicWatch, message_tree
@@ -23,6 +24,8 @@ __all__ = (
     "IMAGE_TYPES",
     "Driver",
     "Findings",
+    "Form",
+    "FormField",
     "ImageWatch",
     "LogBook",
     "Parameters",
@@ -38,5 +41,6 @@ __all__ = (
     "call_service",
     "form_of",
     "message_tree",
+    "service_type",
     "split_fields",
 )

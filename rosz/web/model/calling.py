@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rosz.introspect.services import find_server
 from rosz.message.text import strify_message
+from rosz.node.type_description import request_type
+from rosz.web.model.forms import read_form
 from rosz.web.model.permission import Permission
-from rosz.web.model.sending import read_form
 
 if TYPE_CHECKING:
     from rosz.graph import View
     from rosz.node import Node
 
-__all__ = ("call_service",)
+__all__ = ("call_service", "service_type")
 
 _TIMEOUT = 30.0
+
+
+def service_type(node: Node, view: View, name: str) -> type[Any]:
+    """Return the class of a service; its server describes one that is unknown here.
+
+    Args:
+        node: The node that requests the description.
+        view: The running nodes.
+        name: Full name of the service.
+
+    Raises:
+        NotFoundError: No node serves it, or the server cannot describe it.
+        ServiceError: The server ended before it described it.
+        WaitTimeout: It did not describe it in time.
+    """
+    return request_type(node, find_server(view, name))
 
 
 def call_service(node: Node, permission: Permission, view: View, name: str, text: str) -> str:
@@ -36,7 +53,7 @@ def call_service(node: Node, permission: Permission, view: View, name: str, text
         WaitTimeout: It did not reply in time.
     """
     permission.check("call", name)
-    cls = node.context.types.service(find_server(view, name).type_name)
+    cls = service_type(node, view, name)
     request = read_form(cls.Request, text, node.now())
     with node.client(name, cls, timeout=_TIMEOUT) as client:
         response = client.call(request)

@@ -6,36 +6,14 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from rosz.introspect.arguments import make_message, read_arguments
-from rosz.message.text import strify_message
+from rosz.web.model.forms import read_form
 from rosz.web.model.permission import Permission
 from rosz.worker import Worker, run_task
 
 if TYPE_CHECKING:
     from rosz.node import Node, Publisher
 
-__all__ = ("Sending", "form_of", "read_form")
-
-
-def form_of(cls: type[Any]) -> str:
-    """Return the fields of a message with their default values, as YAML."""
-    return strify_message(cls()) if cls.__slots__ else ""
-
-
-def read_form(cls: type[Any], text: str, now: int) -> Any:
-    """Return the message of a form; fields that are left out have their default value.
-
-    Args:
-        cls: Class of the message.
-        text: A dictionary of fields in YAML.
-        now: ROS time in nanoseconds, for ``now`` and ``auto``.
-
-    Raises:
-        UsageError: The text is not YAML.
-        EncodeError: A value does not fit.
-    """
-    given = [one for one in read_arguments([text.strip() or "{}"]) if one is not None]
-    return make_message(cls, given or [{}], now)
+__all__ = ("Sending",)
 
 
 class Sending:

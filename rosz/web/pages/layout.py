@@ -73,6 +73,8 @@ body.body--dark { background: #12151c; --rosz-line: #2c3340; --rosz-soft: #9aa5b
   border-radius: 10px; box-shadow: none; }
 .rosz-soft { color: var(--rosz-soft); }
 .rosz-mono { font-family: ui-monospace, 'DejaVu Sans Mono', monospace; font-size: .84rem; }
+.rosz-indent { border-left: 2px solid var(--rosz-line); padding-left: .75rem; }
+.q-item.rosz-group { padding: 4px 0; min-height: 36px; }
 .rosz-number { font-variant-numeric: tabular-nums; }
 .q-table th { color: var(--rosz-soft); font-weight: 600; }
 .rosz-nav.q-item { border-radius: 8px; margin: 2px 8px; min-height: 40px; }

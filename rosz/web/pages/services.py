@@ -7,9 +7,9 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from rosz.errors import RoszError
 from rosz.introspect.services import list_services
-from rosz.web.model import System, call_service, form_of
+from rosz.web.model import System, call_service, service_type
+from rosz.web.pages.form import MessageForm
 from rosz.web.pages.layout import Frame, address_of, empty_state
 
 __all__ = ("show_services",)
@@ -97,10 +97,8 @@ class _Services:
         with ui.column().classes("rosz-card p-4 gap-2 min-w-0"):
             self._name = ui.label("Choose a service.").classes("text-base font-semibold break-all")
             self._type = ui.label("").classes("rosz-soft")
-            self._text = (
-                ui.textarea("Request in YAML; fields left out have their default value")
-                .props("outlined autogrow input-class=rosz-mono")
-                .classes("w-full")
+            self._form = MessageForm(
+                self._system.node, "Request in YAML; fields left out have their default value"
             )
             self._button = ui.button("Call", icon="send", on_click=self._call).props("no-caps")
             self._button.disable()
@@ -121,27 +119,25 @@ class _Services:
         if self._table.rows != rows:
             self._table.rows = rows
         if self._wanted in self._types:
-            self._choose(self._wanted)
+            wanted, self._wanted = self._wanted, ""
+            ui.timer(0, lambda: self._choose(wanted), once=True)
         self._empty.set_visibility(not rows and self._graph.complete and not self._all.value)
 
-    def _choose(self, name: str) -> None:
-        self._wanted = ""
-        type_name = self._types.get(name, "")
+    async def _choose(self, name: str) -> None:
         self._name.set_text(name)
-        self._type.set_text(type_name)
+        self._type.set_text(self._types.get(name, ""))
         self._answer.set_text("")
-        self._button.enable()
+        self._button.disable()
         address_of(f"/services?{urlencode({'service': name}, safe='/')}")
-        try:
-            self._text.set_value(
-                form_of(self._system.node.context.types.service(type_name).Request)
-            )
-        except RoszError as error:
-            self._text.set_value("")
-            self._answer.set_text(str(error))
+        self._form.clear()
+        view = self._graph.survey().view
+        cls = await self._frame.attempt(lambda: service_type(self._system.node, view, name))
+        if cls is not None and self._name.text == name:
+            self._form.show(cls.Request)
+            self._button.enable()
 
     async def _call(self) -> None:
-        name, text = self._name.text, self._text.value
+        name, text = self._name.text, self._form.text
         self._button.disable()
         self._answer.set_text("waiting for the answer …")
         answer = await self._frame.attempt(
