@@ -94,6 +94,12 @@ def launch_command(
     stop: Annotated[
         str | None, Option("--stop NODE", "Stop a node of a running launch.", suggest.nodes)
     ] = None,
+    output: Annotated[
+        str | None,
+        Option(
+            "--output NODE", "Print the newest output of a node of a running launch.", suggest.nodes
+        ),
+    ] = None,
     json: Annotated[bool, Option("--json", "Print JSON, with --status.")] = False,
     machine: Annotated[
         list[str] | None,
@@ -129,9 +135,10 @@ def launch_command(
         with ExitStack() as stack:
             serve(partial(_find_master, stack))
         return 0
-    _check_named(args=args, find_node=find_node, restart=restart, stop=stop)
-    if status or restart or stop:
-        _control(words or (), status=status, restart=restart or "", stop=stop or "", as_json=json)
+    nodes_named = {"restart": restart, "stop": stop, "output": output}
+    _check_named(args=args, find_node=find_node, **nodes_named)
+    if status or any(nodes_named.values()):
+        _control(words or (), {"status": str(status or ""), **nodes_named}, as_json=json)
         return 0
     asked = _asked(
         nodes=nodes,
@@ -401,14 +408,23 @@ def _hint(name: str, packages: PackageIndex) -> str:
     return "; give its path, or a package and a file: rosz launch PACKAGE FILE"
 
 
-def _control(words: Sequence[str], *, status: bool, restart: str, stop: str, as_json: bool) -> None:
-    """Print the status of running launches, or restart or stop one of their nodes."""
+def _control(words: Sequence[str], asked: Mapping[str, str | None], *, as_json: bool) -> None:
+    """Print the status of running launches, or act on one of their nodes.
+
+    Args:
+        words: Words of the command line that stand for files.
+        asked: What is asked for, ``status`` or the node of ``restart``, ``stop`` or ``output``.
+        as_json: Whether to print JSON.
+    """
     from rosz.introspect.connect import command_config
     from rosz.launch.run import StatusClient
     from rosz.session import Session
 
-    if words or (status, bool(restart), bool(stop)).count(True) > 1:
-        raise UsageError("--status, --restart and --stop stand alone: one of them, and no file")
+    (action, node), *more = [(name, value) for name, value in asked.items() if value]
+    if words or more:
+        raise UsageError(
+            "--status, --restart, --stop and --output stand alone: one of them, and no file"
+        )
     environment = Environment.read()
     try:
         session = Session.open(command_config(environment))
@@ -418,10 +434,10 @@ def _control(words: Sequence[str], *, status: bool, restart: str, stop: str, as_
         ) from error
     with session:
         client = StatusClient(session, environment.domain)
-        if restart:
-            client.request("restart", restart)
-        elif stop:
-            client.request("stop", stop)
+        if action in {"restart", "stop"}:
+            client.request("restart" if action == "restart" else "stop", node)
+        elif action == "output":
+            sys.stdout.write("".join(excerpt.text for excerpt in client.newest_output(node)))
         else:
             _print_status(client, environment.domain, as_json=as_json)
 

@@ -94,8 +94,11 @@ ERRORS = {
     ("--sigint-timeout", "0", "demo", "demo.launch", "topic:=a"): (2, "--sigint-timeout is 0; e"),
     ("--sigterm-timeout", "x"): (2, "ERROR: invalid value for '--sigterm-timeout'"),
     ("--nope",): (2, "ERROR: no such option: --nope"),
-    ("--status", "x"): (2, "ERROR: --status, --restart and --stop stand alone"),
-    ("--status", "--stop", "/x"): (2, "ERROR: --status, --restart and --stop stand alone"),
+    ("--status", "x"): (2, "ERROR: --status, --restart, --stop and --output stand alone"),
+    ("--status", "--stop", "/x"): (
+        2,
+        "ERROR: --status, --restart, --stop and --output stand alone",
+    ),
     ("--args", "/a/talkr", "demo", "demo.launch", "topic:=a"): (1, "did you mean '/a/talker'?\n"),
 }
 

@@ -7,6 +7,7 @@ those that start-up needs alone.
 
 from rosz.launch.run.command import Command, Workplace, run_command
 from rosz.launch.run.control import LaunchStatus, NodeStatus, StatusClient
+from rosz.launch.run.excerpt import Excerpt
 from rosz.launch.run.host import Child, Host, ProcessSpec, is_local
 from rosz.launch.run.loop import interrupted_by_signals
 from rosz.launch.run.machines import MachineOption
@@ -25,6 +26,7 @@ from rosz.launch.run.supervisor import Supervisor, Timeouts
 __all__ = (
     "Child",
     "Command",
+    "Excerpt",
     "Host",
     "LaunchProcess",
     "LaunchStatus",

@@ -36,6 +36,8 @@ from rosz.launch.run.protocol import (
     Measure,
     Measured,
     MessageWriter,
+    OutputRead,
+    ReadOutput,
     Ready,
     Refused,
     Request,
@@ -158,6 +160,14 @@ class _Agent:
         elif isinstance(request, Measure):
             assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
             self._host.measure(lambda used: self._writer.send(Measured(used)))
+        elif isinstance(request, ReadOutput):
+            assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
+            number = request.number
+            self._host.read_output(
+                request.owner,
+                request.after,
+                lambda excerpt: self._writer.send(OutputRead(number, excerpt)),
+            )
 
     def _set_up(self, setup: Setup) -> None:
         self._setup = setup

@@ -1,4 +1,4 @@
-"""The status of running launches, and requests to restart or stop their nodes.
+"""The status of running launches, the output of their nodes, and requests to restart or stop them.
 
 A launch replies on ``@rosz/<domain>/launch/<run id>/<session>``; requests and replies are JSON.
 """
@@ -9,11 +9,12 @@ import os
 import socket
 import time
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, TypeVar
 
 import msgspec
 
 from rosz.errors import LaunchError, NotFoundError, RoszError, WaitTimeout, near_miss
+from rosz.launch.run.excerpt import Excerpt, Position
 from rosz.launch.run.loop import Loop, Timer
 from rosz.launch.run.process_tree import Usage
 from rosz.launch.run.supervisor import Process, Supervisor, describe_exit
@@ -26,18 +27,23 @@ __all__ = ("LaunchStatus", "NodeStatus", "StatusClient", "StatusRequest", "Statu
 _STATUS_TIMEOUT = 2.0
 _ACTION_TIMEOUT = 60.0
 _MEASURE_TIMEOUT = 1.0
+_OUTPUT_TIMEOUT = 5.0
+
+T = TypeVar("T")
 
 
 class StatusRequest(msgspec.Struct, frozen=True):
     """A request to a launch.
 
     Attributes:
-        action: ``status``, or ``restart`` or ``stop`` for a node.
+        action: ``status``, or ``restart``, ``stop`` or ``output`` for a node.
         node: Full name of the node.
+        after: Position of the output that is known already.
     """
 
-    action: Literal["status", "restart", "stop"]
+    action: Literal["status", "restart", "stop", "output"]
     node: str = ""
+    after: Position | None = None
 
 
 class NodeStatus(msgspec.Struct, frozen=True):
@@ -55,6 +61,7 @@ class NodeStatus(msgspec.Struct, frozen=True):
         memory: Memory that they hold in bytes.
         machine: Address of the other machine, or the name of the launch's own.
         members: Names of the nodes in it, if it is a container.
+        required: Whether its end by itself ends the launch.
     """
 
     name: str
@@ -68,6 +75,7 @@ class NodeStatus(msgspec.Struct, frozen=True):
     memory: int
     machine: str = ""
     members: tuple[str, ...] = ()
+    required: bool = False
 
 
 class LaunchStatus(msgspec.Struct, frozen=True):
@@ -124,7 +132,13 @@ class StatusServer:
     def _handle(self, query: Query) -> None:
         try:
             request = msgspec.json.decode(query.payload or b"", type=StatusRequest)
-            self._run(request, lambda: self._measure(lambda used: self._reply(query, used)))
+            if request.action == "output":
+                process = self._supervisor.find(request.node)
+                process.host.read_output(
+                    process.owner, request.after, lambda excerpt: self._send(query, excerpt)
+                )
+            else:
+                self._run(request, lambda: self._measure(lambda used: self._reply(query, used)))
         except (msgspec.MsgspecError, RoszError) as error:
             with query:
                 query.reply_error(str(error))
@@ -167,8 +181,11 @@ class StatusServer:
             host.measure(add)
 
     def _reply(self, query: Query, used: dict[int, Usage]) -> None:
+        self._send(query, self._status(used))
+
+    def _send(self, query: Query, reply: msgspec.Struct) -> None:
         with query:
-            query.reply(self._key, msgspec.json.encode(self._status(used)))
+            query.reply(self._key, msgspec.json.encode(reply))
 
     def _status(self, used: dict[int, Usage]) -> LaunchStatus:
         return LaunchStatus(
@@ -200,6 +217,7 @@ class StatusServer:
             memory=used.memory,
             machine=process.place or socket.gethostname(),
             members=tuple(member.full_name for member in node.members),
+            required=node.required,
         )
 
     def close(self) -> None:
@@ -220,13 +238,25 @@ class StatusClient:
         self._domain = domain
 
     def statuses(self) -> list[LaunchStatus]:
-        """Return all running launches of the domain.
+        """Return all running launches of the domain; errors are those of `running`."""
+        return list(self.running().values())
+
+    def running(self) -> dict[str, LaunchStatus]:
+        """Return all running launches of the domain, by the keys that they reply on.
 
         Raises:
             LaunchError: If a launch sends a reply that is not valid.
             WaitTimeout: If a launch runs but does not reply.
         """
-        return [status for _, status in self._running()]
+        replies = self._session.get(
+            own_key(self._domain, "launch", "*", "*"),
+            payload=msgspec.json.encode(StatusRequest("status")),
+            timeout=_STATUS_TIMEOUT,
+        )
+        found = [(reply.key, _decode(reply, LaunchStatus)) for reply in replies if reply.ok]
+        if replies and not found:
+            raise WaitTimeout("answer from a running launch", _STATUS_TIMEOUT)
+        return dict(sorted(found, key=lambda pair: (pair[1].host, pair[1].pid)))
 
     def request(self, action: Literal["restart", "stop"], node: str) -> None:
         """Restart or stop a node, and wait until that is done.
@@ -240,10 +270,58 @@ class StatusClient:
             LaunchError: If the launch refuses, or the node could not be started again.
             WaitTimeout: If the launch does not reply.
         """
+        name, keys = self._launches_of(node)
+        for key in keys:
+            self.act(key, action, name)
+
+    def newest_output(self, node: str) -> list[Excerpt]:
+        """Return the newest output of a node, from each launch that runs one of that name.
+
+        Raises:
+            NotFoundError: If no running launch has such a node.
+            LaunchError: If the launch has ended.
+            WaitTimeout: If the launch does not reply.
+        """
+        name, keys = self._launches_of(node)
+        return [self.read_output(key, name) for key in keys]
+
+    def act(self, key: str, action: Literal["restart", "stop"], node: str) -> None:
+        """Restart or stop a node of one launch, and wait until that is done.
+
+        Args:
+            key: Key of the launch.
+            action: The action.
+            node: Full name of the node.
+
+        Raises:
+            LaunchError: If the launch refuses, or the node could not be started again.
+        """
+        reply = self._send(key, StatusRequest(action, node), _ACTION_TIMEOUT)
+        status = _decode(reply, LaunchStatus)
+        after = next(entry for entry in status.nodes if entry.name == node)
+        if action == "restart" and after.state != "running":
+            raise LaunchError(f"'{node}' did not start again: {after.detail}")
+
+    def read_output(self, key: str, node: str, after: Position | None = None) -> Excerpt:
+        """Return output of a node of one launch.
+
+        Args:
+            key: Key of the launch.
+            node: Full name of the node.
+            after: Position of what is known already; None for the newest output.
+
+        Raises:
+            LaunchError: If the launch has no such node, or has ended.
+        """
+        reply = self._send(key, StatusRequest("output", node, after), _OUTPUT_TIMEOUT)
+        return _decode(reply, Excerpt)
+
+    def _launches_of(self, node: str) -> tuple[str, list[str]]:
+        """Return the full name of a node, and the keys of the launches that run it."""
         name = f"/{node.strip('/')}"
-        running = self._running()
-        known = [entry.name for _, status in running for entry in status.nodes]
-        for entry in (entry for _, status in running for entry in status.nodes):
+        running = self.running()
+        known = [entry.name for status in running.values() for entry in status.nodes]
+        for entry in (entry for status in running.values() for entry in status.nodes):
             if name in entry.members:
                 raise NotFoundError(
                     f"node '{name}' has no process of its own: it is in container '{entry.name}',"
@@ -253,37 +331,25 @@ class StatusClient:
             listing = f"; there are {', '.join(sorted(known))}" if known else ""
             hint = near_miss(name, known) or listing or "; no launch is running"
             raise NotFoundError(f"no launch runs a node '{name}'{hint}")
-        for key, status in running:
-            if any(entry.name == name for entry in status.nodes):
-                self._send(key, StatusRequest(action, name))
+        return name, [
+            key
+            for key, status in running.items()
+            if any(entry.name == name for entry in status.nodes)
+        ]
 
-    def _send(self, key: str, request: StatusRequest) -> None:
+    def _send(self, key: str, request: StatusRequest, timeout: float) -> Reply:
         payload = msgspec.json.encode(request)
-        replies = self._session.get(key, payload=payload, timeout=_ACTION_TIMEOUT)
+        replies = self._session.get(key, payload=payload, timeout=timeout)
         if not replies:
             raise LaunchError(f"the launch of '{request.node}' ended without a reply")
         if not replies[0].ok:
             raise LaunchError(replies[0].payload.decode(errors="replace"))
-        status = _decode_status(replies[0])
-        after = next(entry for entry in status.nodes if entry.name == request.node)
-        if request.action == "restart" and after.state != "running":
-            raise LaunchError(f"'{request.node}' did not start again: {after.detail}")
-
-    def _running(self) -> list[tuple[str, LaunchStatus]]:
-        replies = self._session.get(
-            own_key(self._domain, "launch", "*", "*"),
-            payload=msgspec.json.encode(StatusRequest("status")),
-            timeout=_STATUS_TIMEOUT,
-        )
-        found = [(reply.key, _decode_status(reply)) for reply in replies if reply.ok]
-        if replies and not found:
-            raise WaitTimeout("answer from a running launch", _STATUS_TIMEOUT)
-        return sorted(found, key=lambda pair: (pair[1].host, pair[1].pid))
+        return replies[0]
 
 
-def _decode_status(reply: Reply) -> LaunchStatus:
+def _decode(reply: Reply, kind: type[T]) -> T:
     try:
-        return msgspec.json.decode(reply.payload, type=LaunchStatus)
+        return msgspec.json.decode(reply.payload, type=kind)
     except msgspec.MsgspecError as error:
         raise LaunchError(
             f"the reply of a launch at '{reply.key}' is not valid: {error}; does it run another"

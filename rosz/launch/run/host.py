@@ -17,6 +17,7 @@ import msgspec
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.plan import MachinePlan, NodePlan
 from rosz.launch.run.command import Command, Workplace
+from rosz.launch.run.excerpt import Excerpt, Position, make_excerpt, read_file
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.output import Output, RunFolder, Streams
 from rosz.launch.run.process_tree import TAG, ProcessTree, Usage, group_alive
@@ -27,6 +28,7 @@ __all__ = (
     "LocalChild",
     "LocalHost",
     "OnExit",
+    "OnRead",
     "OnStart",
     "ProcessSpec",
     "is_local",
@@ -40,6 +42,9 @@ The exit code is None if it is not known, because the machine of the process is 
 
 OnStart = Callable[[RoszError | None], None]
 """Called with None once a process has started, or with the reason why it could not be."""
+
+OnRead = Callable[[Excerpt], None]
+"""Called with output of a process."""
 
 _LOCAL_NAMES = frozenset({"", "localhost", "127.0.0.1", "::1"})
 
@@ -113,6 +118,15 @@ class Host(Protocol):
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
         """Call a function with the resources that the processes use, by owner."""
+
+    def read_output(self, owner: int, after: Position | None, done: OnRead) -> None:
+        """Call a function with the newest output of a process.
+
+        Args:
+            owner: Number of the process.
+            after: Position of what is known already; None for the newest output.
+            done: Called on the loop.
+        """
 
 
 class LocalChild:
@@ -201,6 +215,7 @@ class LocalHost:
         self._folder = folder
         self._tree = ProcessTree(tag)
         self._prefixed = prefixed
+        self._files: dict[int, Path] = {}
 
     def start(
         self,
@@ -246,6 +261,16 @@ class LocalHost:
         owners = {tag.removeprefix(f"{self._tree.tag}:"): total for tag, total in totals.items()}
         done({int(owner): total for owner, total in owners.items() if owner.isdigit()})
 
+    def read_output(self, owner: int, after: Position | None, done: OnRead) -> None:
+        """Call a function with the newest output of a process; see `Host.read_output`."""
+        known = after or (0, 0)
+
+        def shown(begin: int, data: bytes) -> None:
+            file = read_file(self._files.get(owner), known[0])
+            done(make_excerpt(file, (begin, data), after))
+
+        self._output.read(owner, known[1], shown)
+
     def _open_streams(self, spec: ProcessSpec, command: Command) -> Streams:
         prefix = f"[{spec.label}] " if self._prefixed else ""
         if command.direct and os.isatty(0):
@@ -255,6 +280,8 @@ class LocalHost:
         try:
             if shown:
                 return self._output.screen(spec.owner, prefix)
+            if file is not None:
+                self._files[spec.owner] = file
             return self._output.log(spec.owner, prefix, file, "a" if spec.again else "w")
         except OSError as error:
             where = "the screen" if shown else f"'{file}'"

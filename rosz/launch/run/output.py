@@ -6,8 +6,10 @@ and writes line by line; otherwise it gets a pipe.
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import fcntl
+import itertools
 import json
 import os
 import socket
@@ -32,10 +34,13 @@ _RELAY_TIMEOUT = 5.0
 """Time in seconds for the relay to start, and to end when its screen accepts nothing."""
 _MIN_LIFE = 1.0
 """Time in seconds: a relay that ends sooner is not started again."""
+_READ_TIMEOUT = 1.0
+"""Time in seconds to wait for output that is kept, before there counts as none."""
 _SEND_TIMEOUT = 0.5
 """Time in seconds for the relay to receive a request, unless the last one failed."""
 
 _OnDrained = Callable[[tuple[str, ...]], None]
+_OnRead = Callable[[int, bytes], None]
 
 
 class RunFolder:
@@ -126,6 +131,8 @@ class Output:
         self._warn = warn
         self._tag = tag
         self._waiting: dict[int, tuple[_OnDrained, Timer]] = {}
+        self._reading: dict[int, tuple[_OnRead, Timer]] = {}
+        self._numbers = itertools.count()
         self._unread = b""
         self._terminals = (os.isatty(1), os.isatty(2))
         self._same = _same_file(1, 2)
@@ -251,6 +258,25 @@ class Output:
             timer.cancel()
             done(tail)
 
+    def read(self, owner: int, after: int, done: _OnRead) -> None:
+        """Call a function with what is kept of the shown output of a process.
+
+        Args:
+            owner: Number of the process.
+            after: Number of bytes that are known already.
+            done: Called on the loop with the number of bytes before the data, and the data.
+        """
+        number = next(self._numbers)
+        timer = self._loop.later(_READ_TIMEOUT, lambda: self._have_read(number, after, b""))
+        self._reading[number] = (done, timer)
+        self._send({"op": "read", "id": owner, "after": after, "number": number})
+
+    def _have_read(self, number: int, begin: int, data: bytes) -> None:
+        done, timer = self._reading.pop(number, (None, None))
+        if done is not None and timer is not None:
+            timer.cancel()
+            done(begin, data)
+
     def _receive(self) -> None:
         try:
             data = self._requests.recv(65536)
@@ -261,7 +287,11 @@ class Output:
         *lines, self._unread = (self._unread + data).split(b"\n")
         for line in lines:
             self._ready = True
-            if reply := json.loads(line):
+            reply = json.loads(line)
+            if "read" in reply:
+                data = base64.b64decode(reply["data"])
+                self._have_read(reply["read"], reply["begin"], data)
+            elif reply:
                 self._drained(reply["id"], tuple(reply["tail"]))
 
     def _restart(self) -> None:

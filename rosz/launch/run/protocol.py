@@ -13,6 +13,7 @@ from typing import Final
 
 import msgspec
 
+from rosz.launch.run.excerpt import Excerpt, Position
 from rosz.launch.run.host import ProcessSpec
 from rosz.launch.run.process_tree import Usage
 from rosz.launch.run.supervisor import Timeouts
@@ -28,7 +29,9 @@ __all__ = (
     "Measure",
     "Measured",
     "MessageWriter",
+    "OutputRead",
     "Ping",
+    "ReadOutput",
     "Ready",
     "Refused",
     "Report",
@@ -41,7 +44,7 @@ __all__ = (
     "rosz_version",
 )
 
-PROTOCOL: Final = 1
+PROTOCOL: Final = 2
 """Version of the messages; it changes when an older side would not understand a newer one."""
 
 _CHUNK = 65536
@@ -100,7 +103,21 @@ class Measure(msgspec.Struct, frozen=True, tag="measure"):
     """A request for the resources that processes use."""
 
 
-Request = Setup | Start | Signal | Ping | Measure
+class ReadOutput(msgspec.Struct, frozen=True, tag="read"):
+    """A request for the newest output of a process.
+
+    Attributes:
+        number: Number of the request.
+        owner: Number of the process in its launch.
+        after: Position of what is known already.
+    """
+
+    number: int
+    owner: int
+    after: Position | None
+
+
+Request = Setup | Start | Signal | Ping | Measure | ReadOutput
 
 
 class AgentVersion(msgspec.Struct, frozen=True, tag="hello"):
@@ -183,7 +200,25 @@ class Measured(msgspec.Struct, frozen=True, tag="measured"):
     used: dict[int, Usage]
 
 
-Report = AgentVersion | Ready | AgentWarning | Started | Refused | Shown | Exited | Gone | Measured
+class OutputRead(msgspec.Struct, frozen=True, tag="output"):
+    """The newest output of a process, by the number of the request."""
+
+    number: int
+    excerpt: Excerpt
+
+
+Report = (
+    AgentVersion
+    | Ready
+    | AgentWarning
+    | Started
+    | Refused
+    | Shown
+    | Exited
+    | Gone
+    | Measured
+    | OutputRead
+)
 
 
 def rosz_version() -> str:

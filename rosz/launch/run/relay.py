@@ -10,6 +10,8 @@ Requests arrive on a stream socket, one JSON object per line, together with desc
     {"op": "add", "id": 7, "sink": 1, "prefix": "[talker] "}     with the descriptor to read
     {"op": "child", "id": 7, "pid": 4711}    with a descriptor of the process, which has started
     {"op": "drain", "id": 7}     the reply, once all is read, is {"id": 7, "tail": […]}
+    {"op": "read", "id": 7, "after": 0, "number": 3}     the reply, what is kept of the output
+        after that many bytes, is {"read": 3, "begin": 0, "data": "…"} in base64
     {"op": "end"}                drain all, then end
 
 The first line that it sends is ``{}``: it has started.
@@ -17,6 +19,7 @@ The first line that it sends is ``{}``: it has started.
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import json
 import os
@@ -34,7 +37,7 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-__all__ = ("Relay", "Source", "main")
+__all__ = ("Newest", "Relay", "Source", "main")
 
 CHUNK = 65536
 MAX_LINE = 65536
@@ -42,6 +45,8 @@ PARTIAL_SECONDS = 0.05
 """Time in seconds to wait for the rest of a line before its beginning is shown."""
 TAIL_LINES = 12
 TAIL_COLUMNS = 400
+MAX_KEPT = 65536
+"""Bytes that are kept of the output of each process."""
 
 _LINE_END = re.compile(rb"[\r\n]")
 _ESCAPES = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\))|[\x00-\x08\r]")
@@ -87,6 +92,31 @@ class Source:
         return b"".join(self.prefix + line for line in data.splitlines(keepends=True))
 
 
+class Newest:
+    """The newest output of a process, and the position of its end in all of it, in bytes."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.end = 0
+
+    def add(self, data: bytes) -> None:
+        """Add output, and forget the oldest if there is too much."""
+        self.end += len(data)
+        self.data += data[-MAX_KEPT:]
+        if len(self.data) > 2 * MAX_KEPT:
+            del self.data[:-MAX_KEPT]
+
+    def after(self, position: int) -> tuple[int, bytes]:
+        """Return what is kept after a position, and where it begins.
+
+        Args:
+            position: The position; all is returned after one that is not of this output.
+        """
+        oldest = self.end - min(len(self.data), MAX_KEPT)
+        begin = max(oldest, position) if 0 <= position <= self.end else oldest
+        return begin, bytes(self.data[len(self.data) - (self.end - begin) :])
+
+
 class Relay:
     """Copies all sources, and handles requests.
 
@@ -103,6 +133,7 @@ class Relay:
         self.selector.register(requests, selectors.EVENT_READ, None)
         self.sources: dict[int, Source] = {}
         self.tails: dict[int, deque[str]] = {}
+        self.newest: dict[int, Newest] = {}
         self.descriptors: deque[int] = deque()
         self.unread = b""
         self.attached = True
@@ -170,6 +201,8 @@ class Relay:
             self._forget(request["id"])
             if self.descriptors:
                 self.children[request["id"]] = (request["pid"], self.descriptors.popleft())
+        elif request["op"] == "read":
+            self._answer(request)
         elif request["op"] == "drain":
             self._drain(request["id"])
             self._forget(request["id"])
@@ -192,6 +225,13 @@ class Relay:
         tail = list(self.tails.get(owner, ()))
         with contextlib.suppress(OSError):  # the launch has ended and needs no reply
             self.requests.sendall(json.dumps({"id": owner, "tail": tail}).encode() + b"\n")
+
+    def _answer(self, request: dict[str, Any]) -> None:
+        newest = self.newest.get(request["id"])
+        begin, data = (0, b"") if newest is None else newest.after(request["after"])
+        reply = {"read": request["number"], "begin": begin, "data": base64.b64encode(data).decode()}
+        with contextlib.suppress(OSError):  # the launch has ended and needs no reply
+            self.requests.sendall(json.dumps(reply).encode() + b"\n")
 
     def _read_all(self, source: Source) -> None:
         while source.fd in self.sources and self._read(source):
@@ -221,6 +261,7 @@ class Relay:
         if not data:
             return
         self._write(source.sink, source.add_prefix(data))
+        self.newest.setdefault(source.owner, Newest()).add(data)
         tail = self.tails[source.owner]
         for line in _LINE_END.split(data[-TAIL_LINES * TAIL_COLUMNS :]):
             text = _ESCAPES.sub("", line.decode(errors="replace")).rstrip()

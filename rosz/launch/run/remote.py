@@ -13,7 +13,8 @@ import msgspec
 from rosz.errors import LaunchError
 from rosz.launch.plan import MachinePlan
 from rosz.launch.run.console import Console
-from rosz.launch.run.host import OnExit, OnStart, ProcessSpec
+from rosz.launch.run.excerpt import Excerpt, Position
+from rosz.launch.run.host import OnExit, OnRead, OnStart, ProcessSpec
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.machines import ssh_command, ssh_failure
 from rosz.launch.run.process_tree import Usage
@@ -27,7 +28,9 @@ from rosz.launch.run.protocol import (
     Measure,
     Measured,
     MessageWriter,
+    OutputRead,
     Ping,
+    ReadOutput,
     Ready,
     Refused,
     Report,
@@ -122,6 +125,7 @@ class RemoteHost:
         self._serials = itertools.count(1)
         self._children: dict[int, RemoteChild] = {}
         self._measuring: list[Callable[[dict[int, Usage]], None]] = []
+        self._reading: dict[int, tuple[OnRead, Position | None]] = {}
         self._errors: list[str] = []
         self._connected = False
         self._closing = False
@@ -182,6 +186,15 @@ class RemoteHost:
             return
         self._measuring.append(done)
         self.send(Measure())
+
+    def read_output(self, owner: int, after: Position | None, done: OnRead) -> None:
+        """Call a function with the newest output of a process, which is none if it is lost."""
+        if self.error:
+            done(Excerpt("", after or (0, 0)))
+            return
+        number = next(self._serials)
+        self._reading[number] = (done, after)
+        self.send(ReadOutput(number, owner, after))
 
     def send(self, message: msgspec.Struct) -> None:
         """Send a request to the agent; it is dropped if the machine is lost."""
@@ -244,6 +257,9 @@ class RemoteHost:
             self._console.show(report.sink, self._texts[report.sink].decode(report.data))
         elif isinstance(report, Measured):
             self._report_usage(report.used)
+        elif isinstance(report, OutputRead):
+            if report.number in self._reading:
+                self._reading.pop(report.number)[0](report.excerpt)
         else:
             self._update(report)
 
@@ -318,6 +334,9 @@ class RemoteHost:
             self._console.error(f"remote[{self._name}]: {why}")
         self._ssh.kill()
         self._report_usage({})
+        reading, self._reading = self._reading, {}
+        for done, after in reading.values():
+            done(Excerpt("", after or (0, 0)))
         children, self._children = self._children, {}
         for child in children.values():
             child.gone = True

@@ -85,6 +85,50 @@ def test_stop(tmp_path: Path, network: Network, client: StatusClient) -> None:
     assert "all processes on machine have died" in run.out.getvalue()
 
 
+def test_output_is_followed_from_the_screen_and_from_files(
+    tmp_path: Path, network: Network, client: StatusClient
+) -> None:
+    more = tmp_path / "more"
+    os.mkfifo(more)
+    script = f"printf '\\033[31mgrün\\033[0m\\n'; echo oh >&2; cat {more}; exec sleep 600"
+    nodes = shell("shown", script, output="screen"), shell("kept", "echo one; echo oh >&2")
+    with launch(tmp_path, *nodes, network=network) as run:
+        run.pid("kept-2")
+        (key,) = client.running()
+
+        def has_come(name: str, *texts: str) -> bool:
+            found = client.read_output(key, name).text
+            return all(text in found for text in texts)
+
+        eventually(lambda: has_come("/shown", "grün\n", "oh\n"), "the output of /shown")
+        eventually(lambda: has_come("/kept", "one\n", "oh\n"), "the output of /kept")
+        (known,) = client.newest_output("shown")
+        assert client.read_output(key, "/shown", known.position).text == ""
+        more.write_text("later\n")
+        eventually(
+            lambda: client.read_output(key, "/shown", known.position).text == "later\n",
+            "what comes later",
+        )
+        with pytest.raises(LaunchError, match="this launch has no node '/none'"):
+            client.read_output(key, "/none")
+        assert client.read_output(key, "/shown", (-1, 1 << 40)).text.endswith("later\n")
+
+
+def test_much_output_is_bounded(tmp_path: Path, network: Network, client: StatusClient) -> None:
+    script = f"yes some words | head -c 3000000; touch {tmp_path}/done; exec sleep 600"
+    with launch(tmp_path, shell("a", script), network=network) as run:
+        run.pid("a-1")
+        (key,) = client.running()
+        first = client.read_output(key, "/a").position
+        eventually((tmp_path / "done").exists, "all output")
+        newest = client.read_output(key, "/a", (0, 0))
+        assert newest.position == (3_000_000, 0)
+        assert newest.skipped == 3_000_000 - 65536
+        assert 60_000 < len(newest.text) <= 65536
+        assert set(newest.text.splitlines()[:-1]) == {"some words"}
+        assert first <= newest.position
+
+
 def test_requests_that_fail(tmp_path: Path, network: Network, client: StatusClient) -> None:
     with pytest.raises(NotFoundError, match=r"no launch runs a node '/a'; no launch is running"):
         client.request("stop", "a")

@@ -10,7 +10,8 @@ import pytest
 
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.run.console import Console
-from rosz.launch.run.host import OnExit, OnStart, ProcessSpec
+from rosz.launch.run.excerpt import Excerpt, Position
+from rosz.launch.run.host import OnExit, OnRead, OnStart, ProcessSpec
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.process_tree import Usage
 from rosz.launch.run.supervisor import Process, State, Supervisor, Timeouts
@@ -53,6 +54,10 @@ class Machine:
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
         done({})
+
+    def read_output(self, owner: int, after: Position | None, done: OnRead) -> None:
+        del owner, after
+        done(Excerpt("", (0, 0)))
 
 
 class Record(Supervisor):
