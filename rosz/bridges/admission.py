@@ -147,6 +147,9 @@ def server_tls(
     else:
         return None
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    # A ticket comes while clients send their first request. A client in Python that receives on one
+    # thread and sends on another can lose the request then, since OpenSSL has no lock for them.
+    context.num_tickets = 0
     try:
         context.load_cert_chain(*files)
     except (OSError, ValueError) as error:

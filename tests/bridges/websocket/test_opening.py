@@ -52,6 +52,9 @@ def test_keys(network: Network, tmp_path: Path) -> None:
             with known as connection:
                 client = Client(connection)
                 client.sync()
+                assert isinstance(connection.socket, ssl.SSLSocket)
+                assert connection.socket.session is not None
+                assert not connection.socket.session.has_ticket  # it would come unasked
                 client.send("advertise", topic="/odom", type="std_msgs/String")
                 assert "the rules of this machine" in client.receive_op("status")["msg"]
                 client.send("subscribe", topic="/odom", type="std_msgs/String")
