@@ -52,7 +52,8 @@ __all__ = ("BUCKETS", "EMPTY_DIGEST", "Differences", "History", "Merge")
 BUCKETS: Final = 64
 _MAX_TOGGLED: Final = 1000
 _DIGEST: Final = struct.Struct(f"<{BUCKETS}Q")
-EMPTY_DIGEST: Final = bytes(_DIGEST.size)
+_FASTEST: Final = 1
+EMPTY_DIGEST: Final = zlib.compress(bytes(_DIGEST.size), _FASTEST)
 """The digest of the empty set."""
 
 
@@ -168,8 +169,11 @@ class History:
         return (write for write in self.writes() if _bucket_of("/".join(write.path)) == index)
 
     def digest(self) -> bytes:
-        """Return the digest of the set, in the form that replicas exchange."""
-        return _DIGEST.pack(*self._numbers())
+        """Return the digest of the set, in the form that replicas exchange.
+
+        It is compressed, since with few parameters most of it is zeros.
+        """
+        return zlib.compress(_DIGEST.pack(*self._numbers()), _FASTEST)
 
     def differing(self, digest: bytes) -> list[int]:
         """Return the buckets in which this set differs from the set of another digest.
@@ -177,9 +181,13 @@ class History:
         Raises:
             DecodeError: The bytes are not a digest.
         """
-        if len(digest) != _DIGEST.size:
-            raise DecodeError("digest", 0, f"{len(digest)} bytes, expected {_DIGEST.size}")
-        theirs = _DIGEST.unpack(digest)
+        try:
+            content = zlib.decompressobj().decompress(digest, _DIGEST.size + 1)
+        except zlib.error as error:
+            raise DecodeError("digest", 0, str(error)) from error
+        if len(content) != _DIGEST.size:
+            raise DecodeError("digest", 0, f"{len(content)} bytes, expected {_DIGEST.size}")
+        theirs = _DIGEST.unpack(content)
         return [index for index, ours in enumerate(self._numbers()) if ours != theirs[index]]
 
     def compare(

@@ -15,6 +15,7 @@ The protocol between replicas, and between a replica and its clients:
   gets all writes in the first reply. Deletions are writes as well (**tombstones**). A replica that
   has forgotten deletions which the other may not know replies with all its writes, for the other
   to merge (`rosz.params.history`).
+  A replica that is an elder appoints another one with the digest that it sends.
 - **Clients.** A process that has no replica reads on the ``ask`` key of a replica, and writes on
   its ``set`` key, with a stamp of its own.
 
@@ -343,6 +344,7 @@ class SyncRequest(msgspec.Struct, omit_defaults=True):
         records: Writes that the receiver lacks.
         horizon: Time up to which the sender may have forgotten deletions.
         sender: Zenoh id of the sender's session.
+        appoints: Whether the receiver has to become an elder.
     """
 
     digest: bytes | None = None
@@ -350,6 +352,7 @@ class SyncRequest(msgspec.Struct, omit_defaults=True):
     records: list[Record] = []
     horizon: int = 0
     sender: str = ""
+    appoints: bool = False
 
 
 class SyncReply(msgspec.Struct, omit_defaults=True):

@@ -59,8 +59,9 @@ _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionContr
 """Congestion control for a full link, by whether to wait for it."""
 _ORIGIN = {True: zenoh.Locality.REMOTE, False: None}
 _HEARTBEAT_SECONDS = 0.5
-_TOKENS_SECONDS = 2.0
-"""Seconds in which the tokens come that exist when a watch begins."""
+_TOKENS_SECONDS = 10.0
+"""Seconds in which the tokens come that exist when a watch begins; nobody waits for a process that
+is stopped, but those of a busy router come late."""
 
 _log = logging.getLogger("rosz.session")
 

@@ -7,7 +7,7 @@ from network import eventually
 
 from rosz.params.replica import Replica
 from rosz.params.replica import replica as joining
-from rosz.params.wire import Keys, Member
+from rosz.params.wire import Keys, Member, SyncRequest, encode
 from rosz.session import SessionConfig
 
 from .network import Network
@@ -39,6 +39,7 @@ def sort_out(everyone: list[Replica]) -> tuple[list[Replica], list[Replica]]:
 
     eventually(agreed, "all know the elders")
     few = [replica for replica in everyone if replica._elder is not None]
+    few.sort(key=lambda one: one._own)
     return few, [replica for replica in everyone if replica._elder is None]
 
 
@@ -74,8 +75,9 @@ def test_elders_that_are_too_many_follow_no_longer(network: Network) -> None:
     for replica in others:
         replica._members.follow_all("elder")
         replica._become_elder()
-    assert {one.zid for one in sort_out(few + others)[0]} == {one.zid for one in few}
-    eventually(lambda: all(len(one._members.zids) == joining._ELDERS for one in others), "the rest")
+    left, rest = sort_out(few + others)
+    assert left == sorted(few + others, key=lambda one: one._own)[: joining._ELDERS]
+    eventually(lambda: all(len(one._members.zids) == joining._ELDERS for one in rest), "the rest")
 
 
 def test_what_another_than_an_elder_missed_is_found(network: Network) -> None:
@@ -105,3 +107,21 @@ def test_a_newcomer_joins_whatever_becomes_of_elders(network: Network, count: in
 def test_tokens_of_elders_carry_the_replica() -> None:
     member = Member(12, "f0", "a program (pid 1 on here)")
     assert KEYS.member(KEYS.elder_token(member)) == member
+
+
+def test_where_there_is_an_elder_it_appoints_others(network: Network) -> None:
+    network.session(SessionConfig(mode="router", rendezvous=network.rendezvous))
+    mute = Mute(network)
+    network.keep(mute.session.token(KEYS.elder_token(mute.member)))
+    replica = network.join(network.command())
+    eventually(lambda: len(replica._members.elders()) == 1, "it knows the elder")
+    if replica._elder is not None:  # it was told too late
+        replica._elder.close()
+        replica._elder = None
+    for _ in range(10):
+        replica._check_elders()
+    assert replica._elder is None
+    sender = network.command()
+    request = encode(SyncRequest(b"", appoints=True))
+    sender.get(KEYS.of(replica.zid, "sync"), payload=request, timeout=10.0)
+    eventually(lambda: replica._elder is not None, "it is one now")

@@ -57,16 +57,17 @@ _ELDERS: Final = 3
 """Elders that there should be."""
 
 _CHANCE: Final = 0.02
-"""Chance that a replica becomes an elder in a second, if there are too few: of many that start at
-once, a few may do so before the others are told. As long as there is none, it grows each second."""
+"""Chance that a replica becomes an elder in a second, if there is none; it grows each second."""
 
 _GROWTH: Final = 4
+_APPOINT_EVERY: Final = 10.0
+"""Seconds in which a replica that was appointed becomes an elder, and all others are told."""
 
 _ELDER: Final = "elder"
 _READER: Final = "reader"
 _WRITER: Final = "writer"
 _MESH_TIMEOUT: Final = 2.0
-_TOKENS_TIMEOUT: Final = 5.0
+_TOKENS_TIMEOUT: Final = 10.0
 """Seconds of the search for replicas; it takes milliseconds, or more while many start at once."""
 
 _COMPARE_EVERY: Final = 5.0
@@ -190,14 +191,19 @@ class Replica(_Copy):
             settled.wait(_MESH_TIMEOUT)
         self._elder: Closable | None = None
         self._chance = _CHANCE
+        self._appoint_at = 0.0
         self._members.follow(self._on_elder, self._on_member, _TOKENS_TIMEOUT)
-        # Where rules may keep some replicas apart from others, all are elders.
-        if elder := keys.scoped or not self._members.elders():
+        if keys.scoped or not self._members.elders():
             self._members.follow_all(_ELDER, _TOKENS_TIMEOUT)
+        # Where rules may keep some replicas apart from others, all are elders.
+        elder = keys.scoped or not self._members.elders()
+        if not elder:
+            self._members.unfollow_all(_ELDER)
         self._token = session.token(keys.token(self._own))
         self._join()
         if elder:
             self._become_elder()
+        sync.on_appointed = self._become_elder
         AntiEntropy(self._is_oldest, sync, self._parameter_keys, self._compact, self._check_elders)
 
     def set(
@@ -374,22 +380,36 @@ class Replica(_Copy):
             self._sync.compare_soon(member.zid)
 
     def _check_elders(self) -> None:
-        """Become an elder if there are too few, or be none any more if there are too many."""
+        """Be an elder if there is none, and none any more if there are too many; appoint others."""
         elders = self._members.elders()
         if self._elder is not None:
             if not self._keys.scoped and sum(one < self._own for one in elders) >= _ELDERS:
                 self._elder.close()
                 self._elder = None
                 self._members.unfollow_all(_ELDER)
-        elif len(elders) >= _ELDERS:
+            elif len(elders) < _ELDERS - 1 and self._is_oldest():
+                self._appoint_elders(_ELDERS - 1 - len(elders))
+        elif elders:
             self._chance = _CHANCE
         elif random.random() < self._chance:  # noqa: S311  # not for security
-            self._members.follow_all(_ELDER)
             self._become_elder()
-        elif not elders:
+        else:
             self._chance *= _GROWTH
 
+    def _appoint_elders(self, count: int) -> None:
+        """Let others become elders, who all see that there are too few, and not who else does."""
+        now = time.monotonic()
+        known = {one.zid for one in self._members.elders()} | self._core.session.out_of_reach()
+        others = sorted(self._members.zids - known)
+        if now >= self._appoint_at and others:
+            self._appoint_at = now + _APPOINT_EVERY
+            for zid in random.sample(others, min(count, len(others))):
+                self._sync.appoint(zid)
+
     def _become_elder(self) -> None:
+        if self._elder is not None:
+            return
+        self._members.follow_all(_ELDER)
         self._elder = self._core.session.token(self._keys.elder_token(self._own))
         if self._lifecycle.closing:  # perhaps too late for the thread that closes the replica
             self._elder.close()

@@ -85,6 +85,7 @@ class Synchroniser:
         busy: Replicas that it is comparing itself with.
         refused: Writes that others refuse.
         merge: Function called with all writes and the horizon of another replica, to merge them.
+        on_appointed: Function called when this replica has to become an elder.
     """
 
     def __init__(self, core: Core) -> None:
@@ -97,6 +98,7 @@ class Synchroniser:
         self.busy: set[str] = set()
         self.refused: _RefusedWrites = _RefusedWrites()
         self.merge: Callable[[list[Write], int], object] = core.state.merge
+        self.on_appointed: Callable[[], object] = bool
         self._appeared: set[str] = set()
         self._warned = False
 
@@ -170,6 +172,10 @@ class Synchroniser:
         """Forget what a replica refused: it may return, and was perhaps only out of reach."""
         self.worker.submit(lambda: self.refused.drop_peer(zid))
 
+    def appoint(self, zid: str) -> None:
+        """Compare with a replica, which becomes an elder."""
+        self.worker.submit(partial(self._compare, zid, appoints=True))
+
     def compare_with_one(self) -> None:
         """Compare with a random elder, or with any replica if there is none."""
         zids = [member.zid for member in self.members.elders()] or sorted(self.members.zids)
@@ -207,12 +213,14 @@ class Synchroniser:
         for zid in random.sample(zids, min(len(zids), _MAX_COMPARED)):
             self._compare(zid)
 
-    def _compare(self, zid: str, done: Callable[[bool], object] = bool) -> None:
+    def _compare(
+        self, zid: str, done: Callable[[bool], object] = bool, *, appoints: bool = False
+    ) -> None:
         if zid in self.busy:
             done(False)
             return
         self.busy.add(zid)
-        _Comparison(self, zid, done).start()
+        _Comparison(self, zid, done).start(appoints=appoints)
 
     def _handle(self, query: Query, damage: str, respond: Callable[[], SyncReply]) -> None:
         with query:
@@ -226,6 +234,8 @@ class Synchroniser:
 
     def _compare_digests(self, payload: bytes) -> SyncReply:
         request = decode(payload, SyncRequest)
+        if request.appoints:
+            self.on_appointed()
         found = None
         with self.state as history:
             digest, horizon = history.digest(), history.horizon
@@ -265,9 +275,10 @@ class _Comparison:
         self._ready = False
         self._parts: list[list[Write]] = []
 
-    def start(self) -> None:
+    def start(self, *, appoints: bool) -> None:
         with self._state as history:
             request = self._compose(history, digest=history.digest())
+        request.appoints = appoints
         self._request(request, self._on_digest)
 
     def _compose(

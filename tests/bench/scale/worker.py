@@ -92,7 +92,7 @@ class Start:
         self.declared.wait()
         self.mark()
         steps = ("python", "imports", "session", "declares", "discovery")
-        for step, begin, end in zip(steps, self._marks, self._marks[1:], strict=True):
+        for step, begin, end in zip(steps, self._marks[:-1], self._marks[1:], strict=True):
             tell(step, end - begin)
 
 

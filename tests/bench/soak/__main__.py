@@ -1,8 +1,9 @@
 """Memory of processes that stay while nodes come and go: ``python -m tests.bench.soak``.
 
 A core and a node stay; nodes with sessions of their own come and go, one each second by default.
-A line a minute shows the memory of both (RSS) and how many objects of Python the node holds. At the
-end stand what was added for each node that came and went, and the growth in the second half.
+A line a minute shows the memory of both (RSS), their threads and open files, and how many objects
+of Python the node holds. At the end stand what was added for each node that came and went, and the
+growth in the second half.
 ``python -m tests.upstream.memory`` shows the share that is Zenoh's.
 """
 
@@ -24,12 +25,20 @@ FLAT = 5
 """Percent that memory may grow in the second half."""
 
 
+class Usage(NamedTuple):
+    """What a process uses: memory in kB, threads, and open files."""
+
+    memory: int
+    threads: int
+    files: int
+
+
 class Sight(NamedTuple):
-    """What was seen at one moment: nodes so far, memory in kB, and objects of Python."""
+    """What was seen at one moment: nodes so far, what each process uses, and objects of Python."""
 
     nodes: int
-    core: int
-    node: int
+    core: Usage
+    node: Usage
     objects: int
 
 
@@ -66,10 +75,14 @@ class Part:
         self.stdin.flush()
         return self.line()
 
-    def memory(self) -> int:
-        """Return its resident memory in kB."""
-        status = Path(f"/proc/{self.process.pid}/status").read_text()
-        return int(status.partition("VmRSS:")[2].split()[0])
+    def usage(self) -> Usage:
+        """Return what it uses now."""
+        folder = Path(f"/proc/{self.process.pid}")
+        status = (folder / "status").read_text()
+        memory, threads = (
+            int(status.partition(f"{name}:")[2].split()[0]) for name in ("VmRSS", "Threads")
+        )
+        return Usage(memory, threads, len(list((folder / "fd").iterdir())))
 
     def close(self) -> None:
         """End it."""
@@ -105,9 +118,10 @@ def watch(given: Namespace, variables: dict[str, str]) -> list[Sight]:
             if time.monotonic() < due:
                 continue
             due += given.every
-            sights.append(Sight(count, core.memory(), node.memory(), int(node.ask())))
+            sights.append(Sight(count, core.usage(), node.usage(), int(node.ask())))
+            figures = (count, *sights[-1].core, *sights[-1].node, sights[-1].objects)
             print(f"| {(time.monotonic() - began) / 60:.1f} |", end="")
-            print("".join(f" {figure} |" for figure in sights[-1]), flush=True)
+            print("".join(f" {figure} |" for figure in figures), flush=True)
         return sights
     finally:
         for part in reversed(parts):
@@ -118,7 +132,9 @@ def main() -> None:
     """Print a table, and whether memory is flat."""
     given = options()
     print(f"{busy()}\n", file=sys.stderr)
-    print("| minute | nodes so far | core, kB | node, kB | objects |\n|---|---|---|---|---|")
+    process = "threads | files"
+    print(f"| minute | nodes so far | core, kB | {process} | node, kB | {process} | objects |")
+    print(f"|{'---|' * 9}")
     with tempfile.TemporaryDirectory(prefix="rosz-") as folder:
         own = {"HOME": folder, "ROSZ_RENDEZVOUS": f"unixsock-stream/{folder}/z.sock"}
         root = str(Path(__file__).parents[3])
@@ -128,7 +144,7 @@ def main() -> None:
     middle, last = sights[len(sights) // 2], sights[-1]
     nodes = max(1, last.nodes - middle.nodes)
     for name in ("core", "node"):
-        before, after = getattr(middle, name), getattr(last, name)
+        before, after = getattr(middle, name).memory, getattr(last, name).memory
         growth = 100 * (after - before) / before
         flat = "flat" if growth <= FLAT else "grows"
         print(
