@@ -12,6 +12,7 @@ import msgspec
 
 from rosz.bridges.foxglove import protocol
 from rosz.bridges.listener import pieces
+from rosz.bridges.tasks import Task, Tasks
 from rosz.bridges.websocket import Feed, Message, Outbox, build
 from rosz.errors import RoszError, TypeNotFound, UsageError
 
@@ -75,7 +76,7 @@ class Shared(msgspec.Struct, frozen=True):
     parameters: Parameters
     services: Services
     assets: Assets
-    worker: Worker[Callable[[], object]]
+    worker: Worker[Task]
     session: str
     offered: tuple[str, ...] = CAPABILITIES
 
@@ -123,7 +124,7 @@ class Connection:
         self._watched: dict[int, _Watched] = {}
         self._published: dict[int, tuple[str, Publisher[Any]]] = {}
         self._limit = limit
-        self._calling = 0
+        self._tasks = Tasks(shared.worker, limit)
         self._files: deque[protocol.FetchAsset] = deque()
         self._file = b""
         self._time = _Time()
@@ -210,6 +211,7 @@ class Connection:
             watched = list(self._watched.values())
             self._watched.clear()
         self._outbox.close()
+        self._tasks.close()
         self._shared.catalog.leave(self)
         self._shared.parameters.unfollow(self)
         for feed in (self._time, *watched):
@@ -332,15 +334,12 @@ class Connection:
 
     def _call(self, message: protocol.ServiceCall) -> None:
         size = len(message.data) + self._limit // _CALLS
-        with self._lock:
-            full = self._calling and self._calling + size > self._limit
-            self._calling += 0 if full else size
-        if full:
-            self._fail(message, "earlier calls have not ended, and there are too many of them")
-        else:
-            self._shared.worker.submit(partial(self._call_now, message, size))
+        try:
+            self._tasks.submit(partial(self._call_now, message), size)
+        except UsageError as error:
+            self._fail(message, str(error))
 
-    def _call_now(self, message: protocol.ServiceCall, size: int) -> None:
+    def _call_now(self, message: protocol.ServiceCall) -> None:
         try:
             channel = self._shared.catalog.service(message.service)
             self._shared.gate.check("call", channel.name)
@@ -350,9 +349,6 @@ class Connection:
             self._outbox.put(protocol.response_frame(message, response))
         except RoszError as error:
             self._fail(message, str(error))
-        finally:
-            with self._lock:
-                self._calling -= size
 
     def _fail(self, message: protocol.ServiceCall, reason: str) -> None:
         failure = {"op": "serviceCallFailure", "serviceId": message.service}

@@ -7,7 +7,6 @@ import logging
 import re
 import ssl
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Self
 
@@ -22,10 +21,10 @@ from rosz.bridges.foxglove.protocol import SUBPROTOCOLS
 from rosz.bridges.foxglove.services import Services
 from rosz.bridges.gate import Gate
 from rosz.bridges.listener import Listener, place
+from rosz.bridges.tasks import task_worker
 from rosz.bridges.websocket import Encodings, Outbox, Topics
 from rosz.errors import RoszError
 from rosz.lifecycle import Lifecycle
-from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -38,7 +37,6 @@ __all__ = ("PORT", "FoxgloveBridge", "Limits", "Offer")
 PORT = 8765
 """Port of foxglove_bridge."""
 
-_CALLS = 64
 _POLICY = 1008
 _UNREAD = "answers wait that the client does not read"
 
@@ -123,7 +121,7 @@ class FoxgloveBridge:
             keep.keep(Parameters(node, gate)),
             keep.keep(Services(node)),
             Assets(node.context.environment, offer.assets),
-            keep.keep(Worker[Callable[[], object]]("rosz-foxglove-calls", threads=_CALLS)),
+            keep.keep(task_worker("rosz-foxglove-calls")),
             str(time.time_ns()),
             offer.capabilities,
         )

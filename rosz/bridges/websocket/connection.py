@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from rosz.bridges.logs import is_log, to_ros2_log
+from rosz.bridges.tasks import Task, Tasks
 from rosz.bridges.websocket import operations as ops
 from rosz.bridges.websocket.actions import Gateways, SentGoals, ServedActions
 from rosz.bridges.websocket.messages import build_from_json
@@ -57,7 +58,7 @@ class Shared(msgspec.Struct, frozen=True):
     topics: Topics
     gateways: Gateways
     rosapi: RosApi
-    worker: Worker[Callable[[], object]]
+    worker: Worker[Task]
     spelling: Spelling = "ros1"
     password: str = ""
 
@@ -91,11 +92,10 @@ class Connection:
         self._outbox = outbox
         self._name = name
         self._refuse = refuse
-        self._limit = limit
+        self._tasks = Tasks(shared.worker, limit)
         self._fragment_size = fragment_size
         self._parts = ops.Fragments(limit)
         self._size = 0
-        self._pending = 0
         self._spelling = shared.spelling
         self._level = "error"
         self._numbers = itertools.count(1)
@@ -171,28 +171,13 @@ class Connection:
         self._size = len(text)
         return operation
 
-    def _later(self, task: Callable[[], object]) -> None:
+    def _later(self, task: Task) -> None:
         """Perform what takes long on a thread of the bridge.
 
         Raises:
             UsageError: Operations of this client that have not ended are too large together.
         """
-        size = self._size + _CALL_SIZE
-        with self._lock:
-            if self._pending and self._pending + size > self._limit:
-                raise UsageError(
-                    f"earlier operations of {self._pending} bytes have not ended; wait for answers"
-                )
-            self._pending += size
-
-        def perform() -> None:
-            try:
-                task()
-            finally:
-                with self._lock:
-                    self._pending -= size
-
-        self._shared.worker.submit(perform)
+        self._tasks.submit(task, self._size + _CALL_SIZE)
 
     def send(self, value: dict[str, Any], *, fragment_size: float | None = None) -> None:
         """Send an operation."""
@@ -207,6 +192,7 @@ class Connection:
             feeds = list(self._feeds.values())
             self._feeds.clear()
         self._outbox.close()
+        self._tasks.close()
         for feed in feeds:
             self._shared.topics.unsubscribe(feed)
         self._shared.topics.unadvertise(self)

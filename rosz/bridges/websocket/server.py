@@ -6,7 +6,6 @@ import asyncio
 import logging
 import ssl
 import threading
-from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
@@ -15,6 +14,7 @@ import msgspec
 from rosz.bridges.admission import Admission
 from rosz.bridges.gate import Gate
 from rosz.bridges.listener import Listener, pieces, place
+from rosz.bridges.tasks import task_worker
 from rosz.bridges.websocket.actions import Gateways
 from rosz.bridges.websocket.connection import Connection, Shared
 from rosz.bridges.websocket.operations import fragments, png
@@ -25,7 +25,6 @@ from rosz.bridges.websocket.topics import Topics
 from rosz.errors import RoszError
 from rosz.lifecycle import Lifecycle
 from rosz.transforms import Republisher
-from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -38,7 +37,6 @@ __all__ = ("PORT", "Limits", "WebsocketBridge")
 PORT = 9090
 """Port of rosbridge."""
 
-_CALLS = 64
 _ENCODED_HERE = 16384
 """Bytes of a message that the thread of the server encodes itself."""
 _POLICY = 1008
@@ -104,9 +102,6 @@ class WebsocketBridge:
         self._admission = admission
         self._limits = limits
         self._lifecycle = Lifecycle("the websocket bridge")
-        self._calls = self._lifecycle.keep(
-            Worker[Callable[[], object]]("rosz-calls", threads=_CALLS)
-        )
         topics = Topics(node, Encodings(limits.encoded))
         self._shared = Shared(
             node,
@@ -114,7 +109,7 @@ class WebsocketBridge:
             topics,
             Gateways(node),
             RosApi(node),
-            self._calls,
+            self._lifecycle.keep(task_worker("rosz-calls")),
             spelling,
             admission.password,
         )

@@ -1,0 +1,86 @@
+"""The tasks of one client that take long, on threads that all clients of a bridge share."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from typing import TypeAlias
+
+from rosz.errors import UsageError
+from rosz.worker import Worker
+
+__all__ = ("Task", "Tasks", "task_worker")
+
+Task: TypeAlias = Callable[[], object]
+
+_AT_ONCE = 16
+_THREADS = 512
+
+
+def task_worker(name: str) -> Worker[Task]:
+    """Return the threads for the tasks of all clients.
+
+    Args:
+        name: Name of the threads.
+    """
+    return Worker[Task](name, threads=_THREADS)
+
+
+class Tasks:
+    """The tasks of one client: calls and goals.
+
+    A few run at once and others wait for their turn, so that calls that do not end leave threads
+    for the tasks of other clients.
+
+    Args:
+        worker: The threads.
+        limit: Largest size of the tasks that have not ended, in bytes.
+    """
+
+    def __init__(self, worker: Worker[Task], limit: int) -> None:
+        self._worker = worker
+        self._limit = limit
+        self._lock = threading.Lock()
+        self._size = 0
+        self._running = 0
+        self._waiting: deque[tuple[Task, int]] = deque()
+
+    def submit(self, task: Task, size: int) -> None:
+        """Perform a task on a thread, when its turn comes.
+
+        Args:
+            task: The task.
+            size: Bytes that it takes until it has ended.
+
+        Raises:
+            UsageError: The tasks that have not ended are too large together.
+        """
+        with self._lock:
+            if self._size and self._size + size > self._limit:
+                raise UsageError(
+                    f"earlier operations of {self._size} bytes have not ended; wait for answers"
+                )
+            self._size += size
+            self._waiting.append((task, size))
+            self._start_next()
+
+    def close(self) -> None:
+        """Forget the tasks that wait."""
+        with self._lock:
+            self._waiting.clear()
+
+    def _start_next(self) -> None:
+        if self._waiting and self._running < _AT_ONCE:
+            self._running += 1
+            self._worker.submit(partial(self._perform, *self._waiting.popleft()))
+
+    def _perform(self, task: Task, size: int) -> None:
+        try:
+            task()
+        finally:
+            with self._lock:
+                self._size -= size
+                self._running -= 1
+                self._start_next()
