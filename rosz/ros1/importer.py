@@ -37,6 +37,7 @@ from rosz.ros1.modules import (
     MODULES,
     SUBMODULES,
     add_submodules,
+    attribute,
     explain_missing,
     submodule,
 )
@@ -235,8 +236,20 @@ class _FrontFinder(MetaPathFinder):
         if root in self._modules or fullname in self._modules:
             return self._of_rosz(fullname, root)
         if root in self._shipped and not rest:
-            return _alias(fullname, lambda: import_module(f"rosz.msgs.{root}"))
+            return _alias(fullname, lambda: self._of_messages(root))
         return None
+
+    def _of_messages(self, package: str) -> ModuleType:
+        """Return the module of a shipped package; its modules of types load when they are used.
+
+        In ROS 1 ``import std_msgs`` is enough for ``std_msgs.msg``, which rospy has imported.
+        """
+        module = import_module(f"rosz.msgs.{package}")
+        homes = {
+            kind: f"{package}.{kind}" for kind in _KINDS if shipped_types(package, _KINDS[kind])
+        }
+        vars(module).setdefault("__getattr__", attribute(package, module, homes))
+        return module
 
     def _of_rosz(self, name: str, root: str) -> ModuleSpec | None:
         """Find ``rospy`` or one of its submodules; importing it may need an extra."""

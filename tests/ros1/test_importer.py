@@ -216,6 +216,22 @@ def test_errors_in_definitions_have_a_place(tmp_path: Path, workspace: Path) -> 
     assert run(code, tmp_path, workspace) == expected
 
 
+def test_types_of_a_shipped_package_need_no_import_of_their_own(tmp_path: Path) -> None:
+    code = """
+        import rosz.ros1
+        import std_msgs, geometry_msgs, std_srvs
+        print(std_msgs.msg.String("x").data, geometry_msgs.msg.Twist().linear.x)
+        print(std_srvs.srv.Empty._type)
+        try:
+            std_msgs.srv
+        except AttributeError as error:
+            print(error)
+    """
+    printed = run(code, tmp_path).splitlines()
+    missing = "module 'std_msgs' of rosz has no attribute 'srv'"
+    assert printed == ["x 0.0", "std_srvs/Empty", missing]
+
+
 def test_other_imports_are_unchanged(tmp_path: Path, workspace: Path) -> None:
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "__init__.py").write_text("WHO = 'another one'\n")
