@@ -65,6 +65,13 @@ with rosz.Node("robot") as node:
 """
 
 _CHROMIUM, _DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+_ARGUMENTS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--use-angle=swiftshader",  # draws 3D without a graphics processor
+    "--enable-unsafe-swiftshader",
+)
 _LAPTOP, _PHONE = (1280, 800), (390, 844)
 THEMES = (("laptop", "light"), ("phone", "dark"))
 """The screens and colors that each page is opened with."""
@@ -79,7 +86,7 @@ def open_browser() -> Iterator[Any]:
     from selenium.webdriver.chrome.service import Service
 
     options = webdriver.ChromeOptions()
-    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+    for argument in _ARGUMENTS:
         options.add_argument(argument)
     options.binary_location = _CHROMIUM
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

@@ -125,6 +125,7 @@ SEEN = {
     "/console": ("the battery is low", "/robot"),
     "/drive": ("It stands.", "hold the arrow keys"),
     "/images": ("/camera", "80 x 60 mono8"),
+    "/3d": ("Fixed frame", "From above", "10 x 10 cells"),
     "/parameters": ("gains", "rate", "1.5"),
     "/reconfigure": ("speed", "How fast it drives", "Camera", "lights"),
     "/services": ("/enable", "std_srvs/SetBool"),

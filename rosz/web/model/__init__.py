@@ -9,6 +9,7 @@ from rosz.web.model.console import LogBook
 from rosz.web.model.driving import Driver
 from rosz.web.model.findings import Findings
 from rosz.web.model.forms import Form, FormField, form_of
+from rosz.web.model.frames import Frames, read_frame
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
 from rosz.web.model.pictures import IMAGE_TYPES, ImageWatch, Pictures
@@ -26,6 +27,7 @@ __all__ = (
     "Findings",
     "Form",
     "FormField",
+    "Frames",
     "ImageWatch",
     "LogBook",
     "Parameters",
@@ -41,6 +43,7 @@ __all__ = (
     "call_service",
     "form_of",
     "message_tree",
+    "read_frame",
     "service_type",
     "split_fields",
 )

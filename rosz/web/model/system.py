@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rosz.introspect.survey import Survey
 from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
+from rosz.web.model.frames import Frames
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
 from rosz.web.model.pictures import Pictures
@@ -66,6 +67,7 @@ class System:
         findings: Findings of the doctor.
         console: The log of all nodes.
         parameters: The parameters of all nodes.
+        frames: All frames and their transforms.
         pictures: The sources of pictures.
     """
 
@@ -75,6 +77,7 @@ class System:
         self.graph: Shared[GraphWatch] = Shared(lambda: GraphWatch(node))
         self.traffic: Shared[Traffic] = Shared(lambda: Traffic(node))
         self.findings: Shared[Findings] = Shared(lambda: Findings(node.context.environment))
+        self.frames: Shared[Frames] = Shared(lambda: Frames(node))
         self.pictures = Pictures()
         self.console: Shared[LogBook] = Shared(lambda: LogBook(node))
         self.parameters: Shared[Parameters] = Shared(lambda: Parameters(node, permission))
@@ -82,5 +85,12 @@ class System:
     @property
     def observed(self) -> int:
         """Number of uses that pages have open."""
-        shared = (self.graph, self.traffic, self.findings, self.console, self.parameters)
+        shared = (
+            self.graph,
+            self.traffic,
+            self.findings,
+            self.frames,
+            self.console,
+            self.parameters,
+        )
         return sum(one.users for one in shared)

@@ -55,6 +55,7 @@ ENTRIES = (
     Entry("/topics", "Topics", "swap_horiz"),
     Entry("/plot", "Plot", "show_chart"),
     Entry("/images", "Images", "photo_camera"),
+    Entry("/3d", "3D", "view_in_ar"),
     Entry("/console", "Console", "subject"),
     Entry("/parameters", "Parameters", "tune"),
     Entry("/reconfigure", "Reconfigure", "settings_input_component"),
@@ -64,11 +65,11 @@ ENTRIES = (
 """The pages, in the order of the navigation."""
 
 _STYLE = """
-:root { --rosz-line: #d9dee7; --rosz-soft: #5b6577; --rosz-card: #ffffff; }
+:root { --rosz-line: #d9dee7; --rosz-soft: #5b6577; --rosz-card: #ffffff; --rosz-scene: #e9edf4; }
 body { background: #f4f6fa; }
 .nicegui-content { padding: 0; }
 body.body--dark { background: #12151c; --rosz-line: #2c3340; --rosz-soft: #9aa5b8;
-  --rosz-card: #1a1f29; }
+  --rosz-card: #1a1f29; --rosz-scene: #1b202a; }
 .rosz-card { background: var(--rosz-card); border: 1px solid var(--rosz-line);
   border-radius: 10px; box-shadow: none; }
 .rosz-soft { color: var(--rosz-soft); }
@@ -96,6 +97,7 @@ a { color: #2456c8; } body.body--dark a { color: #9dbcff; }
 body.body--dark .rosz-graph { --graph-text: #e6eaf2; --graph-node: #22345c;
   --graph-node-line: #6b9bff; --graph-topic: #33301f; --graph-topic-line: #b59c55;
   --graph-line: #75819a; }
+.rosz-label { font-size: 12px; color: inherit; white-space: nowrap; pointer-events: none; }
 @media (min-width: 600px) { .rosz-narrow { display: none !important; } }
 @media (max-width: 599px) { .rosz-wide { display: none !important; } }
 """

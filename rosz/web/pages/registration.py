@@ -51,6 +51,12 @@ def _add_pages_of_data(system: System) -> None:
     def drive(topic: str = "") -> None:
         show_drive(system, topic)
 
+    @ui.page("/3d")
+    def scene(frame: str = "", show: str = "", view: str = "") -> None:
+        from rosz.web.pages.scene import show_scene
+
+        show_scene(system, frame, show, view)
+
     @ui.page("/console")
     def console(node: str = "", level: str = "DEBUG", pattern: str = "") -> None:
         show_console(system, node, level, pattern)

@@ -1,0 +1,107 @@
+"""The frames of the system, while a page shows them in space."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING
+
+from rosz.errors import DecodeError, TransformError
+from rosz.transforms import IDENTITY, Buffer, Pose, TransformListener
+
+if TYPE_CHECKING:
+    from rosz.node import Node
+
+__all__ = ("Frames", "read_frame")
+
+_PREFERRED = ("map", "odom", "world", "base_footprint", "base_link")
+_LENGTH = 10_000_000_000
+_HEADER_SIZE = 16
+
+
+class Frames:
+    """All frames and their transforms, received until it is closed.
+
+    Args:
+        node: The node that receives them.
+
+    Attributes:
+        buffer: The transforms.
+        version: Number that grows with each message.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.buffer: Buffer = Buffer(_LENGTH)
+        self.version: int = 0
+        self._node = node
+        self._listener = TransformListener(self.buffer, node, self._count)
+
+    def _count(self, _transforms: list[object], _publisher: bytes, *, static: bool) -> None:
+        del static
+        self.version += 1
+
+    def names(self) -> list[str]:
+        """Return the names of all frames, sorted."""
+        return self.buffer.frames()
+
+    def best(self) -> str:
+        """Return the frame that most views are fixed to; empty if there is none."""
+        known = self.names()
+        for name in _PREFERRED:
+            if name in known:
+                return name
+        children = self.buffer.histories()
+        roots = [name for name in known if name not in children]
+        return next(iter(roots or known), "")
+
+    def find(self, fixed: str, frame: str, stamp: int = 0) -> Pose:
+        """Return the pose of a frame in another one.
+
+        Args:
+            fixed: Frame to transform to.
+            frame: Frame of the coordinates; a leading slash is ignored.
+            stamp: Time in nanoseconds; 0 for the latest one.
+
+        Raises:
+            TransformError: It is not known.
+        """
+        frame = frame.removeprefix("/")
+        if frame and frame == fixed:
+            return IDENTITY
+        return self.buffer.lookup(fixed, frame, stamp)[0]
+
+    def why_not(self, fixed: str, frame: str, stamp: int = 0) -> str:
+        """Return why a transform is not known; empty if it is."""
+        if not frame:
+            return "the message has no frame_id"
+        if not fixed:
+            return "there is no fixed frame"
+        try:
+            self.find(fixed, frame, stamp)
+        except TransformError as error:
+            return str(error).strip()
+        return ""
+
+    def age(self, frame: str) -> float | None:
+        """Return the seconds since the newest transform of a frame; None for a static one."""
+        history = self.buffer.histories().get(frame)
+        if history is None or history.static:
+            return None
+        return max((self._node.now() - history.latest) / 1e9, 0.0)
+
+    def close(self) -> None:
+        """Stop receiving."""
+        self._listener.close()
+
+
+def read_frame(payload: bytes, type_name: str) -> str:
+    """Return the frame of an encoded message that begins with a header.
+
+    Raises:
+        DecodeError: The payload is too short, or not CDR.
+    """
+    order = "<" if payload[1:2] == b"\x01" else ">"
+    if len(payload) < _HEADER_SIZE:
+        raise DecodeError(type_name, 0, f"expected a header, got {payload.hex(' ')}")
+    (length,) = struct.unpack_from(f"{order}I", payload, _HEADER_SIZE - 4)
+    text = payload[_HEADER_SIZE : _HEADER_SIZE + length]
+    return text.rstrip(b"\0").decode("utf-8", "replace").removeprefix("/")

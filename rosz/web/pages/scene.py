@@ -1,0 +1,351 @@
+"""The system in space, as rviz shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from nicegui import ui
+from nicegui.elements.scene.scene_object3d import Object3D
+
+from rosz.errors import RoszError
+from rosz.introspect.topics import list_topics
+from rosz.names import short_type
+from rosz.web.model import Frames, System
+from rosz.web.pages.layout import Frame, address_of
+from rosz.web.scene import (
+    DRAWN_TYPES,
+    GRID,
+    TF,
+    Display,
+    FrameDisplay,
+    GridDisplay,
+    Look,
+    Setup,
+    TopicDisplay,
+    format_setup,
+    read_setup,
+)
+
+__all__ = ("show_scene",)
+
+_PERIOD = 0.1
+_LIST_PERIOD = 1.0
+_COLORS = ("#e0483e", "#2f6fed", "#1f9d61", "#e0a21a", "#8a4fd0", "#0f9bb0", "#c13c8b")
+_CLOUDS = {"height": "by height", "intensity": "by intensity", "rgb": "their own"}
+_CHOICES = {
+    "nav_msgs/OccupancyGrid": {"costmap": "of a costmap"},
+    "sensor_msgs/LaserScan": _CLOUDS,
+    "sensor_msgs/PointCloud": _CLOUDS,
+    "sensor_msgs/PointCloud2": _CLOUDS,
+}
+"""What colors can stand for, by type."""
+_OWN_COLORS = frozenset({"Frames", "nav_msgs/OccupancyGrid"})
+_OWN_SIZES = frozenset({"nav_msgs/OccupancyGrid", "sensor_msgs/Range"})
+_UNITS = dict.fromkeys(_CHOICES, "Pixels")
+_VIEWS = {"orbit": "From the side", "top": "From above"}
+
+
+class _Drawn(Object3D, component=Path(__file__).with_name("drawing.js")):
+    """The drawing of one display.
+
+    Args:
+        address: Where the browser finds the newest one.
+    """
+
+    def __init__(self, address: str) -> None:
+        super().__init__(address)
+
+    def renew(self, address: str) -> None:
+        """Let the browser show a newer one when it has time."""
+        self.args[0] = address
+        self.run_method("update", address)
+
+
+def show_scene(system: System, frame: str, show: str, view: str) -> None:
+    """Build the page.
+
+    Args:
+        system: The system.
+        frame: The fixed frame; empty to choose one.
+        show: The displays, as the address holds them.
+        view: ``orbit`` or ``top``.
+    """
+    _ScenePage(system, read_setup(frame, show, view))
+
+
+class _ScenePage:
+    """The view, and the displays in it."""
+
+    def __init__(self, system: System, setup: Setup) -> None:
+        self._system = system
+        self._frame = frame = Frame(system, "3D", "/3d")
+        self._graph = frame.use(system.graph)
+        self._frames: Frames = frame.use(system.frames)
+        self._setup = setup
+        self._shown: list[_Shown] = []
+        self._chosen = bool(setup.frame)
+        with frame.content:
+            with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+                self._fixed = (
+                    ui.select(
+                        [setup.frame] if setup.frame else [],
+                        value=setup.frame or None,
+                        label="Fixed frame",
+                        with_input=True,
+                        on_change=self._choose_frame,
+                    )
+                    .props("dense options-dense")
+                    .classes("w-44")
+                )
+                self._view = (
+                    ui.toggle(_VIEWS, value=setup.view, on_change=self._look_from)
+                    .props("dense no-caps flat")
+                    .classes("rosz-view")
+                )
+                ui.space()
+                self._add = (
+                    ui.select({}, label="Add a display", on_change=self._add_chosen)
+                    .props("dense options-dense")
+                    .classes("w-60")
+                )
+            with ui.element("div").classes(
+                "w-full grid gap-4 grid-cols-1 lg:grid-cols-[minmax(0,1fr)_19rem]"
+            ):
+                self._scene = (
+                    ui.scene(grid=False, background_color="#f4f6fa", fps=30)
+                    .classes("rosz-card w-full overflow-hidden rosz-scene")
+                    .style("height: calc(100vh - 190px); min-height: 320px")
+                )
+                self._list = ui.column().classes("w-full gap-2 min-w-0")
+        frame.keep(self)
+        for look in setup.looks:
+            self._show(look)
+        self._look_from(None)
+        frame.every(_LIST_PERIOD, self._refresh_lists)
+        frame.every(_PERIOD, self._refresh)
+
+    def close(self) -> None:
+        """Close all displays."""
+        for shown in self._shown:
+            shown.close()
+        self._shown.clear()
+
+    # Displays.
+
+    def _show(self, look: Look) -> None:
+        with self._list:
+            shown = _Shown(self._system, self._scene, look, self._changed, self._remove)
+        self._shown.append(shown)
+
+    def _open(self, look: Look) -> Display:
+        """Open a display.
+
+        Raises:
+            RoszError: It cannot be opened, or not yet.
+        """
+        if look.name == GRID:
+            return GridDisplay(look)
+        if look.name == TF:
+            return FrameDisplay(look, self._frames)
+        self._system.permission.check("subscribe", look.name)
+        return TopicDisplay(self._system.node, self._graph.survey(), look, self._frames)
+
+    def _remove(self, shown: _Shown) -> None:
+        self._shown.remove(shown)
+        shown.remove()
+        self._changed()
+
+    def _add_chosen(self) -> None:
+        name = self._add.value
+        if not name:
+            return
+        self._add.set_value(None)
+        color = _COLORS[len(self._shown) % len(_COLORS)]
+        kind = self._found().get(name, "")
+        plain = name in {GRID, TF} or kind in {"sensor_msgs/PointCloud2", "nav_msgs/OccupancyGrid"}
+        self._show(Look(name, "" if plain else color))
+        self._changed()
+
+    def _found(self) -> dict[str, str]:
+        """Return the topics that can be shown, with their types."""
+        return {
+            one.name: short_type(kind)
+            for one in list_topics(self._graph.survey().view.tokens)
+            for kind in one.types
+            if short_type(kind) in DRAWN_TYPES
+        }
+
+    # What the address holds.
+
+    def _changed(self) -> None:
+        looks = tuple(shown.look for shown in self._shown)
+        fixed = str(self._fixed.value or "") if self._chosen else ""
+        self._setup = Setup(fixed, looks, str(self._view.value))
+        address_of(format_setup(self._setup))
+
+    def _choose_frame(self) -> None:
+        self._chosen = True
+        self._changed()
+
+    def _look_from(self, _: object) -> None:
+        if self._view.value == "top":
+            self._scene.move_camera(0.0, -0.01, 12.0, 0.0, 0.0, 0.0)
+        else:
+            self._scene.move_camera(-5.0, -5.0, 4.5, 0.0, 0.0, 0.0)
+        self._changed()
+
+    # What is going on.
+
+    def _refresh_lists(self) -> None:
+        shown = {one.look.name for one in self._shown}
+        options = {GRID: "grid", TF: "tf (frames)"}
+        options |= {name: f"{name} ({kind})" for name, kind in sorted(self._found().items())}
+        options = {name: text for name, text in options.items() if name not in shown}
+        if self._add.options != options:
+            self._add.set_options(options)
+        names = self._frames.names()
+        if not self._chosen and (best := self._frames.best()) and best != self._fixed.value:
+            self._fixed.set_options(names, value=best)
+            self._chosen = False
+        current = self._fixed.value
+        listed = sorted({*names, *((current,) if current else ())})
+        if self._fixed.options != listed:
+            self._fixed.set_options(listed, value=current)
+
+    def _refresh(self) -> None:
+        fixed = str(self._fixed.value or "")
+        for shown in self._shown:
+            if shown.display is None:
+                self._open_shown(shown)
+            shown.refresh(fixed)
+
+    def _open_shown(self, shown: _Shown) -> None:
+        try:
+            shown.open(self._open(shown.look))
+        except RoszError as error:
+            shown.wait(str(error) if self._graph.complete else "")
+
+
+class _Shown:
+    """One display: its settings, and its drawing in the view."""
+
+    def __init__(
+        self,
+        system: System,
+        scene: ui.scene,
+        look: Look,
+        changed: Callable[[], None],
+        remove: Callable[[_Shown], None],
+    ) -> None:
+        self.look = look
+        self.display: Display | None = None
+        self._system = system
+        self._scene = scene
+        self._changed = changed
+        self._key = ""
+        self._kind = ""
+        self._number = 0
+        self._drawn: _Drawn | None = None
+        with ui.column().classes("rosz-card w-full pl-3 pr-1 py-1 gap-0") as self._card:
+            with ui.row().classes("w-full items-center gap-1 no-wrap"):
+                ui.checkbox(value=look.visible, on_change=self._switch).props(
+                    f'dense size=sm aria-label="Show {look.name}"'
+                )
+                ui.label(look.name).classes("font-semibold break-all grow min-w-0 pl-1")
+                ui.button(icon="tune", on_click=self._toggle).props(
+                    f'flat dense round size=sm aria-label="Settings of {look.name}"'
+                )
+                ui.button(icon="close", on_click=lambda: remove(self)).props(
+                    f'flat dense round size=sm aria-label="Remove {look.name}"'
+                )
+            self._status = ui.label("").classes("rosz-soft rosz-number text-xs")
+            self._fault = ui.label("").classes("text-negative text-xs")
+            self._settings = ui.row().classes("w-full items-center gap-2 no-wrap pr-2")
+        self._settings.set_visibility(False)
+        self._fault.set_visibility(False)
+
+    def _toggle(self) -> None:
+        self._settings.set_visibility(not self._settings.visible)
+
+    def _add_settings(self, kind: str) -> None:
+        choices = _CHOICES.get(kind, {})
+        with self._settings:
+            if choices:
+                ui.select(
+                    {"": "by default", **choices},
+                    value=self.look.color if self.look.color in choices else "",
+                    label="Colors",
+                    on_change=lambda e: self._set(color=str(e.value or "")),
+                ).props("dense options-dense").classes("grow min-w-0")
+            if kind not in _OWN_COLORS:
+                shown = self.look.color if self.look.color.startswith("#") else ""
+                ui.color_input(
+                    "Color", value=shown, on_change=lambda e: self._color(e.value or "")
+                ).props("dense").classes("grow min-w-0")
+            if kind not in _OWN_SIZES:
+                ui.number(
+                    _UNITS.get(kind, "Size (m)"),
+                    value=self.look.size or None,
+                    min=0,
+                    step=0.1,
+                    on_change=lambda e: self._set(size=float(e.value or 0)),
+                ).props("dense").classes("w-20")
+
+    def _set(self, **changes: Any) -> None:
+        self.look = msgspec.structs.replace(self.look, **changes)
+        if self.display is not None:
+            self.display.look = self.look
+        self._changed()
+
+    def _switch(self, event: Any) -> None:
+        self._set(visible=bool(event.value))
+
+    def _color(self, value: str) -> None:
+        if value.startswith("#") or (not value and self.look.color.startswith("#")):
+            self._set(color=value)
+
+    def open(self, display: Display) -> None:
+        """Show what a display draws."""
+        self.display = display
+        self._key = self._system.pictures.add(display.encoded)
+        with self._scene:
+            self._drawn = _Drawn("")
+        self._kind = display.kind
+        self._add_settings(display.kind)
+
+    def wait(self, fault: str) -> None:
+        """Say why there is nothing to show yet."""
+        _set(self._fault, fault)
+
+    def refresh(self, fixed: str) -> None:
+        """Let the browser draw what is new."""
+        if self.display is None or self._drawn is None:
+            return
+        if self.display.refresh(fixed):
+            self._number += 1
+            self._drawn.renew(f"/picture/{self._key}?n={self._number}")
+        status = self.display.status
+        _set(self._status, f"{self._kind}: {status}" if status else self._kind)
+        _set(self._fault, self.display.fault)
+
+    def remove(self) -> None:
+        """Take it off the page."""
+        self.close()
+        if self._drawn is not None:
+            self._drawn.delete()
+        self._card.delete()
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._system.pictures.remove(self._key)
+        if self.display is not None:
+            self.display.close()
+
+
+def _set(label: ui.label, text: str) -> None:
+    if label.text != text:
+        label.set_text(text)
+        label.set_visibility(bool(text))

@@ -1,0 +1,303 @@
+"""One display: what it receives while it is shown, and its newest drawing."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from rosz.errors import RoszError, TransformError
+from rosz.introspect.measure import read_stamp
+from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.names import short_type
+from rosz.transforms import IDENTITY, Pose
+from rosz.web.model import Frames, read_frame
+from rosz.web.scene import poses, sensors
+from rosz.web.scene.colors import color_bytes
+from rosz.web.scene.drawing import Drawing
+from rosz.web.scene.setup import Look
+from rosz.web.scene.shapes import draw_axes
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+    from rosz.node import Node
+
+__all__ = ("DRAWN_TYPES", "Display", "FrameDisplay", "GridDisplay", "TopicDisplay")
+
+_QUEUE = 10
+_MOST_BYTES = 32 << 20
+_MEDIA = "application/octet-stream"
+
+_Draw = Callable[[Any, Pose, Look, Drawing], str]
+_DRAW: dict[str, _Draw] = {
+    "geometry_msgs/Point": poses.draw_point,
+    "geometry_msgs/PointStamped": poses.draw_point,
+    "geometry_msgs/Polygon": poses.draw_polygon,
+    "geometry_msgs/PolygonStamped": poses.draw_polygon,
+    "geometry_msgs/Pose": poses.draw_pose,
+    "geometry_msgs/PoseArray": poses.draw_poses,
+    "geometry_msgs/PoseStamped": poses.draw_stamped_pose,
+    "geometry_msgs/PoseWithCovarianceStamped": poses.draw_stamped_pose,
+    "nav_msgs/OccupancyGrid": poses.draw_map,
+    "nav_msgs/Odometry": poses.draw_stamped_pose,
+    "nav_msgs/Path": poses.draw_path,
+    "sensor_msgs/LaserScan": sensors.draw_scan,
+    "sensor_msgs/PointCloud": sensors.draw_old_cloud,
+    "sensor_msgs/PointCloud2": sensors.draw_cloud,
+    "sensor_msgs/Range": sensors.draw_range,
+}
+DRAWN_TYPES = frozenset(_DRAW)
+_NOW = frozenset({"nav_msgs/OccupancyGrid"})
+"""Types that stay where their frame is now, not where it was when they were made."""
+
+
+class Display(Protocol):
+    """What draws something into the view.
+
+    Attributes:
+        look: Its settings.
+        kind: What it shows.
+        status: What it draws at present.
+        fault: Why it does not; empty if it does.
+    """
+
+    look: Look
+    kind: str
+    status: str
+    fault: str
+
+    def refresh(self, fixed: str) -> bool:
+        """Return whether there is something new to draw in a fixed frame."""
+
+    def encoded(self) -> tuple[bytes, str]:
+        """Return the newest drawing and its media type."""
+
+    def close(self) -> None:
+        """Unsubscribe."""
+
+
+class GridDisplay:
+    """The grid on the ground.
+
+    Args:
+        look: Its settings.
+    """
+
+    kind = "Grid"
+    fault = ""
+
+    def __init__(self, look: Look) -> None:
+        self.look = look
+        self.status = ""
+        self._shown: Look | None = None
+
+    def refresh(self, fixed: str) -> bool:
+        """Return whether the settings changed."""
+        del fixed
+        return self._shown is not self.look
+
+    def encoded(self) -> tuple[bytes, str]:
+        """Return the grid."""
+        self._shown = self.look
+        drawing = Drawing()
+        if self.look.visible:
+            self.status = poses.draw_grid(self.look, drawing)
+        return drawing.encode(), _MEDIA
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+class FrameDisplay:
+    """The axes, names and ages of all frames.
+
+    Args:
+        look: Its settings; the size is the length of an axis in metres.
+        frames: The frames.
+    """
+
+    kind = "Frames"
+    _OLD = 1.0
+
+    def __init__(self, look: Look, frames: Frames) -> None:
+        self.look = look
+        self.status = ""
+        self.fault = ""
+        self._frames = frames
+        self._fixed = ""
+        self._shown: tuple[Look, str, int] | None = None
+
+    def refresh(self, fixed: str) -> bool:
+        """Return whether a frame moved."""
+        self._fixed = fixed
+        return self._shown != (self.look, fixed, self._frames.version)
+
+    def encoded(self) -> tuple[bytes, str]:
+        """Return the axes of all frames."""
+        look, fixed = self.look, self._fixed
+        self._shown = look, fixed, self._frames.version
+        drawing = Drawing()
+        if look.visible:
+            self._draw(look, fixed, drawing)
+        return drawing.encode(), _MEDIA
+
+    def _draw(self, look: Look, fixed: str, drawing: Drawing) -> None:
+        found: list[Pose] = []
+        missing: list[str] = []
+        length = look.size or 0.3
+        ends: list[tuple[float, float, float]] = []
+        histories = self._frames.buffer.histories()
+        places: dict[str, Pose] = {}
+        for name in self._frames.names():
+            try:
+                places[name] = self._frames.find(fixed, name)
+            except TransformError:
+                missing.append(name)
+        for name, pose in places.items():
+            found.append(pose)
+            age = self._frames.age(name)
+            old = age is not None and age > self._OLD
+            text = f"{name} ({age:.0f} s old)" if old else name
+            drawing.text(text, pose.translation, "#d0762a" if old else "")
+            parent = histories[name].newest.parent if name in histories else ""
+            if parent in places:
+                ends += [pose.translation, places[parent].translation]
+        draw_axes(drawing, found, length)
+        if ends:
+            drawing.lines(np.array(ends), color_bytes("#c9a227"))
+        self.status = f"{len(found)} frames"
+        some = ", ".join(missing[:3]) + (" …" if len(missing) > 3 else "")  # noqa: PLR2004
+        self.fault = f"not connected with '{fixed}': {some}" if missing else ""
+
+    def close(self) -> None:
+        """Do nothing; the frames belong to all pages."""
+
+
+class _Kept(NamedTuple):
+    """A message that has come, as bytes."""
+
+    payload: bytes
+    frame: str
+    stamp: int
+    number: int
+
+
+class TopicDisplay:
+    """The newest message of a topic whose transform is known.
+
+    A transform may come later than the message that needs it, so that some messages are kept.
+
+    Args:
+        node: The node that subscribes to it.
+        survey: The running nodes.
+        look: Its settings.
+        frames: The frames.
+
+    Raises:
+        NotFoundError: There is no such topic.
+        TypeNotFound: Its type is not known here.
+        DefinitionError: Its definition differs from the one here.
+    """
+
+    def __init__(self, node: Node, survey: Survey, look: Look, frames: Frames) -> None:
+        topic = look.name
+        token = find_token(survey.view, topic, topic_types(survey.view).get(topic, ("",))[0])
+        cls = find_class(node.context, token)
+        self.look = look
+        self.kind: str = short_type(token.type_name)
+        self.status: str = ""
+        self.fault: str = ""
+        self.received: int = 0
+        self._draw = _DRAW[self.kind]
+        self._frames = frames
+        self._stamped: bool = cls._has_header
+        self._decode = node.context.decoder(cls)
+        self._lock = threading.Lock()
+        self._kept: deque[_Kept] = deque(maxlen=_QUEUE)
+        self._bytes = 0
+        self._chosen: tuple[_Kept, Pose] | None = None
+        self._wanted: tuple[Any, ...] = ()
+        self._shown: tuple[Any, ...] = ()
+        self._node = node
+        self._cls = cls
+        self._subscription: Any = None
+        if look.visible:
+            self._subscribe()
+
+    def _subscribe(self) -> None:
+        self._subscription = self._node.subscription(
+            self.look.name, self._cls, self._receive, queue_size=_QUEUE, raw=True
+        )
+
+    def _receive(self, payload: bytes) -> None:
+        frame, stamp = "", 0
+        if self._stamped:
+            frame, stamp = read_frame(payload, self.kind), read_stamp(payload, self.kind)
+        with self._lock:
+            self.received += 1
+            stamp = 0 if self.kind in _NOW else stamp
+            self._kept.append(_Kept(payload, frame, stamp, self.received))
+            while len(self._kept) > 1 and sum(len(one.payload) for one in self._kept) > _MOST_BYTES:
+                self._kept.popleft()
+
+    def refresh(self, fixed: str) -> bool:
+        """Choose the newest message whose transform is known; return whether to draw it."""
+        if self.look.visible != (self._subscription is not None):
+            self._switch()
+        with self._lock:
+            kept = list(self._kept)
+        for number in range(len(kept) - 1, -1, -1):
+            one = kept[number]
+            if not self._stamped:
+                return self._choose(fixed, one, IDENTITY)
+            try:
+                pose = self._frames.find(fixed, one.frame, one.stamp)
+            except TransformError:
+                continue
+            with self._lock:
+                while self._kept and self._kept[0] is not one:
+                    self._kept.popleft()
+            return self._choose(fixed, one, pose)
+        if kept:
+            self.fault = self._frames.why_not(fixed, kept[-1].frame, kept[-1].stamp)
+        return self._wanted != self._shown
+
+    def _choose(self, fixed: str, one: _Kept, pose: Pose) -> bool:
+        self._chosen = one, pose
+        self._wanted = self.look, fixed, one.number, pose
+        return self._wanted != self._shown
+
+    def _switch(self) -> None:
+        """Subscribe when it is shown again, and unsubscribe when it is hidden."""
+        if self.look.visible:
+            self._subscribe()
+            return
+        subscription, self._subscription = self._subscription, None
+        subscription.close()
+        with self._lock:
+            self._kept.clear()
+        self._chosen, self.status, self.fault = None, "", ""
+        self._wanted = (self.look,)
+
+    def encoded(self) -> tuple[bytes, str]:
+        """Return the drawing of the chosen message."""
+        chosen, look = self._chosen, self.look
+        self._shown = self._wanted
+        drawing = Drawing()
+        if chosen is not None and look.visible:
+            one, pose = chosen
+            try:
+                self.status = self._draw(self._decode(one.payload), pose, look, drawing)
+                self.fault = ""
+            except RoszError as error:
+                self.fault = str(error)
+        return drawing.encode(), _MEDIA
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        subscription, self._subscription = self._subscription, None
+        if subscription is not None:
+            subscription.close()

@@ -1,0 +1,188 @@
+"""Poses, paths, polygons, points and maps."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rosz.errors import UsageError
+from rosz.transforms import Pose, compose
+from rosz.web.scene.colors import color_bytes
+from rosz.web.scene.drawing import Array, Drawing, matrix_of, moved, placed
+from rosz.web.scene.setup import Look
+from rosz.web.scene.shapes import draw_arrows, draw_line
+
+__all__ = (
+    "draw_grid",
+    "draw_map",
+    "draw_path",
+    "draw_point",
+    "draw_polygon",
+    "draw_pose",
+    "draw_poses",
+    "draw_stamped_pose",
+    "pose_from",
+)
+
+_LENGTH = 1.0
+_SHORT = 0.3
+_MOST_CELLS = 4096
+_GRID_CELLS = 10
+
+
+def pose_from(message: Any) -> Pose:
+    """Return the pose of a geometry_msgs/Pose; one without a rotation is not rotated."""
+    p, q = message.position, message.orientation
+    length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+    if not length or not math.isfinite(length):
+        return Pose((p.x, p.y, p.z), (0.0, 0.0, 0.0, 1.0))
+    return Pose((p.x, p.y, p.z), (q.x / length, q.y / length, q.z / length, q.w / length))
+
+
+def draw_pose(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a Pose as an arrow."""
+    length = look.size or _LENGTH
+    place = compose(pose, pose_from(message))
+    draw_arrows(
+        drawing, [matrix_of(place)], color_bytes(look.color), length=length, width=length / 5
+    )
+    return ", ".join(f"{name} {value:.2f}" for name, value in zip("xyz", place[0], strict=True))
+
+
+def draw_stamped_pose(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a PoseStamped, PoseWithCovarianceStamped or Odometry as an arrow."""
+    inner = message.pose
+    if hasattr(inner, "covariance"):
+        covariance = inner.covariance
+        place = compose(pose, pose_from(inner.pose))
+        _draw_covariance(covariance, pose, place, look, drawing)
+        inner = inner.pose
+    return draw_pose(inner, pose, look, drawing)
+
+
+def _draw_covariance(
+    covariance: Any, pose: Pose, place: Pose, look: Look, drawing: Drawing
+) -> None:
+    """Draw the positions within one standard deviation, as a flat ellipse."""
+    square = np.array([[covariance[0], covariance[1]], [covariance[6], covariance[7]]])
+    if not np.isfinite(square).all() or not square.any():
+        return
+    values, axes = np.linalg.eigh((square + square.T) / 2)
+    reach = 2 * np.sqrt(np.clip(values, 0.0, None))
+    local = np.eye(4)
+    local[:2, 0], local[:2, 1] = axes[:, 0] * reach[0], axes[:, 1] * reach[1]
+    local[2, 2] = 0.005
+    turned = matrix_of(Pose((0.0, 0.0, 0.0), pose.rotation)) @ local
+    turned[:3, 3] = place.translation
+    color = color_bytes(look.color)
+    color[3] = 70
+    drawing.shapes("cylinder", turned, color)
+
+
+def draw_poses(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a PoseArray as arrows."""
+    matrices = [matrix_of(compose(pose, pose_from(one))) for one in message.poses]
+    length = look.size or _SHORT
+    draw_arrows(drawing, matrices, color_bytes(look.color), length=length, width=length / 4)
+    return f"{len(matrices)} poses"
+
+
+def draw_path(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a Path as a line."""
+    positions = [one.pose.position for one in message.poses]
+    points = moved(np.array([(p.x, p.y, p.z) for p in positions]).reshape(-1, 3), pose)
+    draw_line(drawing, points, color_bytes(look.color), look.size)
+    return f"{len(points)} poses"
+
+
+def draw_polygon(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a Polygon or PolygonStamped as a closed line."""
+    points = getattr(message, "polygon", message).points
+    rows = [(p.x, p.y, p.z) for p in (*points, *points[:1])]
+    corners = moved(np.array(rows).reshape(-1, 3), pose)
+    draw_line(drawing, corners, color_bytes(look.color), look.size)
+    return f"{len(points)} points"
+
+
+def draw_point(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a Point or PointStamped as a sphere."""
+    p = getattr(message, "point", message)
+    place = compose(pose, Pose((p.x, p.y, p.z), (0.0, 0.0, 0.0, 1.0)))
+    size = look.size or 0.2
+    drawing.shapes("sphere", placed(place, size, size, size), color_bytes(look.color, "#cc29cc"))
+    return ", ".join(f"{name} {value:.2f}" for name, value in zip("xyz", place[0], strict=True))
+
+
+def draw_map(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw an OccupancyGrid, with the colors of rviz.
+
+    Raises:
+        UsageError: The number of cells is not that of its size.
+    """
+    info = message.info
+    cells = np.frombuffer(_bytes_of(message.data), np.uint8)
+    if len(cells) != info.width * info.height:
+        raise UsageError(f"the map has {len(cells)} cells; expected {info.width} x {info.height}")
+    if not len(cells):
+        return "0 cells"
+    rows = cells.reshape(info.height, info.width)
+    step = -(-max(rows.shape) // _MOST_CELLS)
+    place = compose(pose, pose_from(info.origin))
+    width, height = info.width * info.resolution, info.height * info.resolution
+    palette = _PALETTE.copy()
+    if look.color == "costmap":
+        palette = _COSTS.copy()
+    drawing.image(rows[::step, ::step], placed(place, width, height), palette)
+    part = f", every {step}th is drawn" if step > 1 else ""
+    return f"{info.width} x {info.height} cells of {info.resolution:g} m{part}"
+
+
+def _bytes_of(data: Any) -> bytes:
+    """Return a sequence of int8 as bytes."""
+    if isinstance(data, bytes | bytearray | memoryview):
+        return bytes(data)
+    return np.asarray(data).astype(np.int8).tobytes()
+
+
+def _map_palette() -> Array:
+    palette = np.full((256, 4), 255, dtype=np.uint8)
+    gray = 255 - np.arange(101) * 255 // 100
+    palette[:101, :3] = gray[:, None]
+    palette[101:128, :3] = (0, 255, 0)
+    palette[128:255, 0] = 255
+    palette[128:255, 1] = np.arange(127) * 255 // 126
+    palette[128:255, 2] = 0
+    palette[255] = (112, 137, 134, 255)
+    return palette
+
+
+def _cost_palette() -> Array:
+    palette = _map_palette()
+    palette[0] = (0, 0, 0, 0)
+    part = np.arange(1, 99)
+    palette[1:99, 0], palette[1:99, 1] = part * 255 // 100, 0
+    palette[1:99, 2] = 255 - part * 255 // 100
+    palette[99], palette[100] = (0, 255, 255, 255), (255, 0, 255, 255)
+    return palette
+
+
+_PALETTE, _COSTS = _map_palette(), _cost_palette()
+
+
+def draw_grid(look: Look, drawing: Drawing) -> str:
+    """Draw a grid on the plane z = 0 of the fixed frame; its size is that of a cell."""
+    size = look.size or 1.0
+    reach = _GRID_CELLS * size / 2
+    at = np.linspace(-reach, reach, _GRID_CELLS + 1)
+    edge = np.full_like(at, reach)
+    zero = np.zeros_like(at)
+    ends = np.concatenate(
+        [
+            np.stack([np.column_stack((at, -edge, zero)), np.column_stack((at, edge, zero))], 1),
+            np.stack([np.column_stack((-edge, at, zero)), np.column_stack((edge, at, zero))], 1),
+        ]
+    )
+    drawing.lines(ends.reshape(-1, 3), color_bytes(look.color, "#8a94a6"))
+    return f"{_GRID_CELLS} x {_GRID_CELLS} cells of {size:g} m"

@@ -1,0 +1,147 @@
+"""Laser scans, point clouds and ranges."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rosz.errors import UsageError
+from rosz.msgs.sensor_msgs.msg import PointField
+from rosz.transforms import Pose
+from rosz.web.scene.colors import BY_HEIGHT, BY_INTENSITY, OWN, color_bytes, rainbow
+from rosz.web.scene.drawing import Array, Drawing, moved, placed
+from rosz.web.scene.setup import Look
+
+__all__ = ("MOST_POINTS", "draw_cloud", "draw_old_cloud", "draw_range", "draw_scan")
+
+MOST_POINTS = 500_000
+"""Points of a cloud that are drawn; of more, every second one, or every third."""
+_PIXELS = 3.0
+_FORMATS = {
+    PointField.INT8: "i1",
+    PointField.UINT8: "u1",
+    PointField.INT16: "i2",
+    PointField.UINT16: "u2",
+    PointField.INT32: "i4",
+    PointField.UINT32: "u4",
+    PointField.FLOAT32: "f4",
+    PointField.FLOAT64: "f8",
+}
+
+
+def draw_scan(scan: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a LaserScan."""
+    ranges = np.asarray(scan.ranges, dtype=np.float64)
+    known = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
+    angles = scan.angle_min + np.arange(len(ranges)) * scan.angle_increment
+    x, y = ranges * np.cos(angles), ranges * np.sin(angles)
+    points = moved(np.column_stack((x, y, np.zeros_like(x)))[known], pose)
+    intensities = np.asarray(scan.intensities, dtype=np.float64)
+    values = intensities[known] if len(intensities) == len(ranges) else None
+    _draw(points, values, None, look, drawing)
+    return f"{len(points)} of {len(ranges)} points"
+
+
+def draw_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a PointCloud2.
+
+    Raises:
+        UsageError: It has no coordinates, or its data end early.
+    """
+    rows = _rows(cloud)
+    fields = rows.dtype.names or ()
+    if any(name not in fields for name in "xyz"):
+        raise UsageError(f"the cloud has no x, y and z; its fields are {', '.join(fields)}")
+    step = -(-len(rows) // MOST_POINTS) or 1
+    rows = rows[::step]
+    points = np.column_stack([rows[name] for name in "xyz"]).astype(np.float32)
+    known = np.isfinite(points).all(axis=1)
+    points, rows = moved(points[known], pose), rows[known]
+    values = rows["intensity"].astype(np.float64) if "intensity" in fields else None
+    own = next((rows[name] for name in ("rgb", "rgba") if name in fields), None)
+    _draw(points, values, None if own is None else _unpacked(own), look, drawing)
+    part = f"every {step}th point, " if step > 1 else ""
+    return f"{part}{len(points)} points"
+
+
+def _rows(cloud: Any) -> Array:
+    """Return the points of a cloud as an array of its fields."""
+    order = ">" if cloud.is_bigendian else "<"
+    fields = [one for one in cloud.fields if one.datatype in _FORMATS]
+    try:
+        kind = np.dtype(
+            {
+                "names": [one.name for one in fields],
+                "formats": [order + _FORMATS[one.datatype] for one in fields],
+                "offsets": [one.offset for one in fields],
+                "itemsize": cloud.point_step,
+            }
+        )
+    except ValueError as error:
+        raise UsageError(f"the fields of the cloud do not fit: {error}") from error
+    count, length = cloud.width * cloud.height, cloud.width * cloud.point_step
+    needed = cloud.row_step * (cloud.height - 1) + length if count else 0
+    if not count:
+        return np.zeros(0, kind)
+    if len(cloud.data) < needed or cloud.row_step < length:
+        raise UsageError(f"the cloud has {len(cloud.data)} bytes of data; expected {needed}")
+    if cloud.row_step == length or cloud.height == 1:
+        return np.frombuffer(cloud.data, kind, count)
+    lines = np.frombuffer(cloud.data[:needed].ljust(cloud.row_step * cloud.height), np.uint8)
+    packed = np.ascontiguousarray(lines.reshape(cloud.height, -1)[:, :length])
+    return packed.reshape(-1).view(kind)
+
+
+def _unpacked(values: Array) -> Array:
+    """Return the colors of a field ``rgb`` or ``rgba``, in which PCL keeps four bytes."""
+    numbers = np.ascontiguousarray(values)
+    if numbers.dtype.itemsize != 4:  # noqa: PLR2004
+        numbers = numbers.astype(np.uint32)
+    numbers = numbers.view(numbers.dtype.str[0] + "u4").astype(np.uint32)
+    colors = np.full((len(numbers), 4), 255, dtype=np.uint8)
+    for channel, shift in enumerate((16, 8, 0)):
+        colors[:, channel] = numbers >> shift & 255
+    return colors
+
+
+def draw_old_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a PointCloud."""
+    points = np.array([(p.x, p.y, p.z) for p in cloud.points[:MOST_POINTS]]).reshape(-1, 3)
+    channels = {one.name: one.values for one in cloud.channels}
+    values = channels.get("intensity", channels.get("intensities"))
+    listed = None if values is None else np.asarray(values, dtype=np.float64)[: len(points)]
+    _draw(moved(points, pose), listed, None, look, drawing)
+    return f"{len(points)} points"
+
+
+def _draw(
+    points: Array, values: Array | None, own: Array | None, look: Look, drawing: Drawing
+) -> None:
+    by = look.color or (OWN if own is not None else BY_INTENSITY)
+    if by == OWN and own is not None:
+        colors = own
+    elif by == BY_INTENSITY and values is not None and len(values) == len(points):
+        colors = rainbow(values)
+    elif by in {BY_HEIGHT, BY_INTENSITY, OWN}:
+        colors = rainbow(points[:, 2])
+    else:
+        colors = color_bytes(by)
+    drawing.points(points, colors, look.size or _PIXELS, pixels=True)
+
+
+def draw_range(found: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a Range as a cone from the sensor."""
+    color = color_bytes(look.color)
+    color[3] = 128
+    if not (math.isfinite(found.range) and found.range > 0):
+        return f"range {found.range:g}"
+    width = 2 * found.range * math.tan(found.field_of_view / 2)
+    # A cone along z with its tip at the end, turned so that the tip is at the sensor.
+    half = math.sqrt(0.5)
+    inner = placed(
+        Pose((found.range / 2, 0.0, 0.0), (0.0, -half, 0.0, half)), width, width, found.range
+    )
+    drawing.shapes("cone", placed(pose) @ inner, color)
+    return f"{found.range:.3g} m"
