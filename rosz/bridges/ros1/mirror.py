@@ -30,7 +30,6 @@ _MAX_CALLS = 1000
 _CLOSE_TIMEOUT = 10.0
 _RETRY_SECONDS = 0.3
 _MOST_TRIES = 10
-_CONNECTING_SECONDS = 0.02
 
 
 class _Part(Protocol):
@@ -199,28 +198,41 @@ class Mirror:
 
     # Connections.
 
-    def _accept(self, incoming: Incoming, header: dict[str, str], tries: int = 0) -> None:
+    def _accept(
+        self,
+        incoming: Incoming,
+        header: dict[str, str],
+        tries: int = 0,
+        waited: frozenset[PublishedTopic] = frozenset(),
+    ) -> None:
         try:
             if "service" in header:
                 self._accept_service(incoming, header)
             elif "topic" in header:
-                self._accept_topic(incoming, header, tries)
+                self._accept_topic(incoming, header, tries, waited)
             else:
                 raise ServiceError("a header without 'topic' or 'service'")
         except RoszError as error:
             incoming.stream.send([encode_header({"error": str(error)})])
             incoming.refuse(str(error))
 
-    def _accept_topic(self, incoming: Incoming, header: dict[str, str], tries: int) -> None:
+    def _accept_topic(
+        self,
+        incoming: Incoming,
+        header: dict[str, str],
+        tries: int,
+        waited: frozenset[PublishedTopic],
+    ) -> None:
         topic, node = header["topic"], header.get("callerid", "")
         part: Any = self._parts.get(("subscriber", topic, node))
         if part is None and node.startswith(MASTER_NODE):
             # A master of another network, for the nodes of which it registers nothing.
             entry = Entry("subscriber", topic, node, "", ANY_TYPE)
             part = self._keep(SubscribedTopic(self._shared, self._own, entry))
-        if self._is_connecting(node):
-            again = partial(self._accept, incoming, header, tries)
-            self._shared.changes.later(_CONNECTING_SECONDS, again)
+        connecting = self._find_connecting(node, waited)
+        if connecting is not None:
+            again = partial(self._accept, incoming, header, tries, waited | {connecting})
+            connecting.when_connected(again)
             return
         if part is None and self._look is not None and tries < _MOST_TRIES:
             self._look()
@@ -231,23 +243,29 @@ class Mirror:
             raise ServiceError(f"node '{node}' is not registered as a subscriber of '{topic}'")
         part.accept(incoming, header)
 
-    def _is_connecting(self, node: str) -> bool:
-        """Return whether the bridge still connects to topics that a node publishes.
+    def _find_connecting(
+        self, node: str, waited: frozenset[PublishedTopic]
+    ) -> PublishedTopic | None:
+        """Return a topic that a node publishes, to which the bridge still connects.
 
         What a node publishes in answer to its first message, as servers of actions do, would be
         lost before that: roscpp keeps nothing for subscribers that are not connected. Bridges do
         not wait for bridges, as both would wait.
+
+        Args:
+            node: Name of the node.
+            waited: Topics that have been waited for; none is twice.
         """
         if node.startswith((MASTER_NODE, BRIDGE)):
-            return False
+            return None
         published = [
             part
             for part in self._parts.values()
-            if isinstance(part, PublishedTopic) and part.entry.node == node
+            if isinstance(part, PublishedTopic) and part.entry.node == node and part not in waited
         ]
         for part in published:
             part.update()  # the network may have subscribed since
-        return any(part.is_connecting for part in published)
+        return next((part for part in published if part.is_connecting), None)
 
     def _accept_service(self, incoming: Incoming, header: dict[str, str]) -> None:
         client = self._clients.find(self._shared.here(header["service"]))

@@ -10,7 +10,7 @@ import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Protocol
 
@@ -176,21 +176,33 @@ class Stream:
         """Whether the stream has ended."""
         return self._closed
 
-    def send(self, parts: Iterable[bytes]) -> None:
+    def send(self, parts: Sequence[bytes]) -> None:
         """Send a message, or queue it; any thread may.
 
         Args:
             parts: Bytes of the message in turn.
         """
-        message = deque(memoryview(part) for part in parts if part)
         with self._lock:
             if self._closed or self._ending:
                 return
-            self._queue.append(message)
-            self._queued += sum(map(len, message))
-            if self._writing:
+            if self._queue:
+                self._put(parts)
                 self._trim()
-            elif not self._flush():
+                return
+            try:
+                count = self._sock.sendmsg(parts)
+            except BlockingIOError:
+                count = 0
+            except OSError:
+                self._loop.call(self.close)
+                return
+            self.sent_bytes += count
+            if count == sum(map(len, parts)):
+                return
+            self._put(parts)
+            if count:
+                self._cut(count)
+            if not self._flush():
                 self._writing = True
                 self._loop.call(self._watch)
 
@@ -266,9 +278,8 @@ class Stream:
     def _flush(self) -> bool:
         """Send what the socket takes; return whether nothing is left. Needs the lock."""
         while self._queue:
-            message = self._queue[0]
             try:
-                count = self._sock.sendmsg(message)
+                count = self._sock.sendmsg(self._queue[0])
             except BlockingIOError:
                 return False
             except OSError:
@@ -276,16 +287,26 @@ class Stream:
                 self._loop.call(self.close)
                 return True
             self.sent_bytes += count
-            self._queued -= count
-            self._begun = True
-            while message and count >= len(message[0]):
-                count -= len(message.popleft())
-            if message:
-                message[0] = message[0][count:]
-                continue
-            self._queue.popleft()
-            self._begun = False
+            self._cut(count)
         return True
+
+    def _put(self, parts: Sequence[bytes]) -> None:
+        """Queue a message. Needs the lock."""
+        message = deque(memoryview(part) for part in parts if part)
+        self._queue.append(message)
+        self._queued += sum(map(len, message))
+
+    def _cut(self, count: int) -> None:
+        """Remove bytes that have been sent from the oldest message. Needs the lock."""
+        message = self._queue[0]
+        self._queued -= count
+        while message and count >= len(message[0]):
+            count -= len(message.popleft())
+        self._begun = bool(message)
+        if message:
+            message[0] = message[0][count:]
+        else:
+            self._queue.popleft()
 
     def _trim(self) -> None:
         """Drop the oldest messages of which nothing has been sent. Needs the lock."""

@@ -39,6 +39,8 @@ _LATCHED = QoS(depth=1, durability="transient_local")
 _FIRST_RETRY = 0.1
 _LAST_RETRY = 2.0
 _QUEUE = 10
+_ALL = 1 << 17
+"""Messages that wait where none is to be dropped; their bytes are limited, too."""
 _PIECE = 1 << 10
 _MANY_PARTS = 32
 """Parts of a message that are not worth a copy; a socket takes 1024 at once."""
@@ -79,6 +81,7 @@ class PublishedTopic:
         self._publisher: Publisher[Any] | None = None
         self._stream: Stream | None = None
         self._connecting = False
+        self._when_connected: list[Callable[[], object]] = []
         self._closed = False
         self._delay = _FIRST_RETRY
         self._reported = ""
@@ -104,6 +107,10 @@ class PublishedTopic:
         """Whether the network wants its messages and the node has not answered, or refused, yet."""
         return self._connecting and not self._reported
 
+    def when_connected(self, task: Callable[[], object]) -> None:
+        """Run a task on the thread for changes when the node has answered, or refused, or gone."""
+        self._when_connected.append(task)
+
     def update(self) -> None:
         """Connect to the node if the network wants its messages, or else disconnect."""
         if self._closed:
@@ -122,6 +129,7 @@ class PublishedTopic:
     def close(self) -> None:
         """Take the topic from the network."""
         self._closed = True
+        self._end_connecting()
         self._disconnect()
         self._undeclare()
 
@@ -186,7 +194,7 @@ class PublishedTopic:
         shared.changes.submit(partial(self._connected, sock, header))
 
     def _connected(self, sock: socket.socket, header: dict[str, str]) -> None:
-        self._connecting = False
+        self._end_connecting()
         codec = self._codec
         if self._closed:
             sock.close()
@@ -224,7 +232,7 @@ class PublishedTopic:
         return codec
 
     def _failed(self, reason: str) -> None:
-        self._connecting = False
+        self._end_connecting()
         if self._closed:
             return
         if reason != self._reported:
@@ -237,8 +245,14 @@ class PublishedTopic:
             )
         self._retry()
 
-    def _retry(self) -> None:
+    def _end_connecting(self) -> None:
         self._connecting = False
+        tasks, self._when_connected = self._when_connected, []
+        for task in tasks:
+            self._shared.changes.submit(task)
+
+    def _retry(self) -> None:
+        self._end_connecting()
         self._shared.changes.later(self._delay, self.update)
         self._delay = min(2 * self._delay, _LAST_RETRY)
 
@@ -319,8 +333,13 @@ class SubscribedTopic:
         ]
 
     def update(self) -> None:
-        """Show the node as a subscriber while it is not connected."""
-        if self._closed or self._links:
+        """Show the node as a subscriber while it is not connected; then adapt the queues."""
+        if self._closed:
+            return
+        if self._links:
+            depth = _depth(self._shared.publishers(self._topic))
+            for link in self._links:
+                link.stream.depth = depth
             return
         before, self._published = self._published, bool(self._shared.publishers(self._topic))
         if self._shown is None:
@@ -426,6 +445,12 @@ def _choose(shared: Shared, topic: str, publishers: list[Token], header: dict[st
     raise RoszError(f"{there}; expected {header.get('type', '')} (md5 {wanted})")
 
 
+def _depth(publishers: Iterable[Token]) -> int:
+    """Return how many messages wait for a slow subscriber: as many as for each publisher alone."""
+    known = [token.qos for token in publishers if token.qos is not None]
+    return sum(_ALL if qos.history == "keep_all" else qos.depth for qos in known) or _QUEUE
+
+
 class _Link:
     """One connection of a subscriber, and the subscription that feeds it.
 
@@ -475,19 +500,18 @@ class _Link:
             publishers: Its publishers there.
             shown: The subscription that has kept messages until now, if there was one.
         """
-        known = [token.qos for token in publishers if token.qos is not None]
         codec, stream = self._codec, self.stream
+        latched = any(token.qos is not None and token.qos.latched for token in publishers)
         fields = {
             "callerid": self._shared.standing_for(Kind.PUBLISHER, topic),
-            "latching": "1" if any(qos.latched for qos in known) else "0",
+            "latching": "1" if latched else "0",
             "md5sum": codec.md5sum,
             "message_definition": codec.definition,
             "topic": name,
             "type": codec.ros1_type,
         }
-        depth = max([_QUEUE, *(qos.depth for qos in known)])
         stream.send([encode_header(fields)])
-        stream.depth = depth
+        stream.depth = depth = _depth(publishers)
         self._shared.loop.call(self._follow)
         with suppress(ClosedError), self._turn:
             subscription: Subscription[Any] = Subscription(
@@ -495,7 +519,7 @@ class _Link:
                 topic,
                 codec.cls,
                 self._receive,
-                for_queue(depth),
+                for_queue(max(_QUEUE, depth)),
                 raw=True,
                 with_info=True,
             )

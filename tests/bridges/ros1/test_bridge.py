@@ -21,6 +21,7 @@ from network import TIMEOUT, eventually
 
 from rosz.bridges.ros1 import MasterBridge
 from rosz.bridges.ros1.frames import decode_header, encode_header
+from rosz.bridges.ros1.mirror import Mirror
 from rosz.bridges.ros1.server import Incoming
 from rosz.errors import ServiceError, TransportError
 from rosz.msgs.rcl_interfaces.msg import Log
@@ -370,9 +371,51 @@ def test_a_service_that_nobody_calls_wakes_no_thread(
     program.send(signal.SIGINT)
 
 
-def test_a_node_gets_messages_when_its_answers_are_heard(world: World, node: Node) -> None:
+def test_a_slow_subscriber_gets_the_newest_of_the_queue(world: World, node: Node) -> None:
+    """As many as the publisher queues, after what is on its way already."""
+    size, count = 12 << 20, 4  # more than a socket takes
+    header = {"topic": "/slow", "callerid": "/slow", "md5sum": String._md5sum}
+    with socket.create_server(("127.0.0.1", 0)) as other, socket.socket() as sock:
+        uri = f"http://127.0.0.1:{other.getsockname()[1]}/"
+        world.call("registerSubscriber", "/slow", "/slow", "std_msgs/String", uri)
+        publisher = node.publisher("/slow", String, queue_size=1)
+        publisher.wait_for_subscribers(timeout=TIMEOUT)
+        eventually(lambda: "/slow" in dict(world.call("getPublishedTopics", "/x", "")[2]))
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
+        sock.connect(("127.0.0.1", world.port))
+        sock.sendall(encode_header(header))
+        reader = sock.makefile("rb")
+        assert b"topic=/slow" in reader.read(*struct.unpack("<I", reader.read(4)))
+        for number in range(1, count + 1):
+            publisher.publish(str(number) * size)
+            eventually(lambda: _sent_to(world, "/slow") == number)  # noqa: B023
+        publisher.close()
+        heard = []
+        for _ in range(2):
+            (length,) = struct.unpack("<I", reader.read(4))
+            heard.append(reader.read(length)[-1:])
+        assert heard == [b"1", b"%d" % count]
+
+
+def _sent_to(world: World, topic: str) -> int:
+    """Return how many messages the bridge has passed on to subscribers of a topic."""
+    found = world.bridge._mirror.connections(topic)
+    return sum(one.messages for one in found if not one.publishes)
+
+
+def test_a_node_gets_messages_when_its_answers_are_heard(
+    world: World, node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The result of an action is the answer to a goal, and often a server's first message."""
     order: list[str] = []
+    looks: list[None] = []
+    find = Mirror._find_connecting
+
+    def counted(*args: Any) -> Any:
+        looks.append(None)
+        return find(*args)
+
+    monkeypatch.setattr(Mirror, "_find_connecting", counted)
     requested, answer = threading.Event(), threading.Event()
 
     class Answering(SimpleXMLRPCServer):
@@ -399,6 +442,7 @@ def test_a_node_gets_messages_when_its_answers_are_heard(world: World, node: Nod
             order.append("connected")
         answer.set()
         assert order[0] == "answered"
+        assert len(looks) <= 2  # before and after, and not all the time
         publisher.close()
         for method, topic in registered:
             world.call(method.replace("reg", "unreg"), "/answering", topic, uri)
