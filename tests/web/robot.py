@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import shutil
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from network import TIMEOUT, Network, Program, eventually
 
-__all__ = ("ROBOT", "THEMES", "open_browser", "set_screen", "take_picture")
+__all__ = ("LONG", "ROBOT", "THEMES", "World", "open_browser", "set_screen", "take_picture")
 
 ROBOT = """
 import math
@@ -75,6 +79,22 @@ _ARGUMENTS = (
 _LAPTOP, _PHONE = (1280, 800), (390, 844)
 THEMES = (("laptop", "light"), ("phone", "dark"))
 """The screens and colors that each page is opened with."""
+LONG = 4 * TIMEOUT
+_ATTEMPT = 3.0
+_CLICK = """
+const found = [...document.querySelectorAll('.q-btn, .q-tree__node-header-content span')]
+  .filter((one) => one.innerText.trim().endsWith(arguments[0]) && one.offsetParent !== null);
+if (found.length) found.at(-1).click();
+return found.length > 0;
+"""
+_FILL = """
+const field = document.querySelector(arguments[0]);
+if (!field) return false;
+Object.getOwnPropertyDescriptor(Object.getPrototypeOf(field), 'value').set.call(
+  field, arguments[1]);
+field.dispatchEvent(new Event('input', {bubbles: true}));
+return true;
+"""
 
 
 @contextmanager
@@ -115,3 +135,77 @@ def take_picture(browser: Any, folder: Path, name: str) -> None:
     """Save what the browser shows."""
     folder.mkdir(exist_ok=True)
     browser.save_screenshot(str(folder / f"{name}.png"))
+
+
+class World:
+    """A robot, the page that shows it, and a browser."""
+
+    def __init__(self, network: Network, robot: Program, server: Program, browser: Any) -> None:
+        self.network = network
+        self.robot = robot
+        self.server = server
+        self.browser = browser
+        found = re.search(r"http://\S+", server.wait_for("the page is at", LONG))
+        assert found is not None
+        self.address = found.group().rstrip("/")
+
+    def open(self, path: str) -> None:
+        """Open a page, and wait until what one does there reaches the server."""
+        self.browser.get(self.address + path)
+        eventually(
+            lambda: self.browser.execute_script("return window.did_handshake === true"),
+            f"{path} is connected",
+            LONG,
+        )
+
+    @property
+    def text(self) -> str:
+        """All text that the browser shows."""
+        return str(self.browser.execute_script("return document.body.innerText"))
+
+    def should_see(self, *texts: str) -> None:
+        """Wait until texts are on the page."""
+        for text in texts:
+            eventually(lambda text=text: text in self.text, f"'{text}' on the page", LONG)  # type: ignore[misc]
+
+    def click(self, text: str) -> None:
+        """Click the innermost thing with a text, as soon as there is one."""
+        eventually(lambda: self.browser.execute_script(_CLICK, text), f"'{text}' to click", LONG)
+
+    def press(self, label: str) -> None:
+        """Click the button with an accessible name, as soon as there is one."""
+        script = """const found = document.querySelector(`button[aria-label="${arguments[0]}"]`);
+            if (found) found.click(); return found !== null"""
+        eventually(
+            lambda: self.browser.execute_script(script, label), f"the button '{label}'", LONG
+        )
+
+    def fill(self, selector: str, text: str) -> None:
+        """Write into a field in place of what is there."""
+        eventually(
+            lambda: self.browser.execute_script(_FILL, selector, text), f"a {selector}", LONG
+        )
+
+    def send(self, text: str, button: str, arrived: Callable[[], bool]) -> None:
+        """Fill in a form and send it, again if the page was not yet complete the first time."""
+
+        def attempt() -> bool:
+            self.fill("textarea", text)
+            self.click(button)
+            deadline = time.monotonic() + _ATTEMPT
+            while not arrived() and time.monotonic() < deadline:
+                threading.Event().wait(0.01)
+            return arrived()
+
+        eventually(attempt, f"what '{text}' does", LONG)
+
+    def should_hold(self, selector: str, text: str) -> None:
+        """Wait until a field holds a text."""
+        value = "return document.querySelector(arguments[0])?.value ?? ''"
+        eventually(
+            lambda: text in self.browser.execute_script(value, selector), f"{text} in a field", LONG
+        )
+
+    def messages(self) -> list[str]:
+        """Return what is on the console of the browser, and forget it."""
+        return [f"{one['level']} {one['message']}" for one in self.browser.get_log("browser")]

@@ -10,6 +10,7 @@ from rosz.web.model.driving import Driver
 from rosz.web.model.findings import Findings
 from rosz.web.model.forms import Form, FormField, form_of
 from rosz.web.model.frames import Frames, read_frame
+from rosz.web.model.launches import Launches, NodeOutput, RunningLaunch
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
 from rosz.web.model.pictures import IMAGE_TYPES, ImageWatch, Pictures
@@ -29,12 +30,15 @@ __all__ = (
     "FormField",
     "Frames",
     "ImageWatch",
+    "Launches",
     "LogBook",
+    "NodeOutput",
     "Parameters",
     "Permission",
     "Pictures",
     "Plot",
     "Reconfiguration",
+    "RunningLaunch",
     "Sending",
     "Shared",
     "System",

@@ -44,6 +44,11 @@ class Permission(msgspec.Struct, frozen=True):
         if objection := self.objection(verb, name):
             raise UsageError(objection)
 
+    @property
+    def sees_launches(self) -> bool:
+        """Whether the page may see launches and the output of their nodes."""
+        return self.permit is None or self.permit.control
+
     def check_control(self, node: str) -> None:
         """Refuse to control a node, unless the page may.
 

@@ -8,6 +8,7 @@ from rosz.introspect.survey import Survey
 from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
 from rosz.web.model.frames import Frames
+from rosz.web.model.launches import Launches
 from rosz.web.model.parameters import Parameters
 from rosz.web.model.permission import Permission
 from rosz.web.model.pictures import Pictures
@@ -65,6 +66,7 @@ class System:
         graph: All nodes and entities.
         traffic: Rates and bandwidths of topics.
         findings: Findings of the doctor.
+        launches: Running launches.
         console: The log of all nodes.
         parameters: The parameters of all nodes.
         frames: All frames and their transforms.
@@ -78,6 +80,7 @@ class System:
         self.traffic: Shared[Traffic] = Shared(lambda: Traffic(node))
         self.findings: Shared[Findings] = Shared(lambda: Findings(node.context.environment))
         self.frames: Shared[Frames] = Shared(lambda: Frames(node))
+        self.launches: Shared[Launches] = Shared(lambda: Launches(node, permission))
         self.pictures = Pictures()
         self.console: Shared[LogBook] = Shared(lambda: LogBook(node))
         self.parameters: Shared[Parameters] = Shared(lambda: Parameters(node, permission))
@@ -90,6 +93,7 @@ class System:
             self.traffic,
             self.findings,
             self.frames,
+            self.launches,
             self.console,
             self.parameters,
         )

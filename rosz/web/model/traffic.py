@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from typing import TYPE_CHECKING
 
 import msgspec
 
+from rosz.errors import DecodeError
 from rosz.introspect.measure import BandwidthMeter, BandwidthStats
 from rosz.introspect.subscribe import subscribe_samples
 from rosz.names import is_of_action, short_type
-from rosz.wire import Kind
+from rosz.wire import Kind, read_attachment
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
     from rosz.node import Entity, Node
+    from rosz.session import Sample
     from rosz.wire import Token
 
 __all__ = ("Flow", "Traffic", "flow_of")
@@ -33,6 +36,10 @@ _HEAVY = frozenset(
 """Types that are measured only on request, since measuring a topic means to receive it."""
 
 
+_AGES = 50
+"""Number of newest messages whose latency counts."""
+
+
 class Flow(msgspec.Struct, frozen=True):
     """Rate and bandwidth of a topic.
 
@@ -40,11 +47,14 @@ class Flow(msgspec.Struct, frozen=True):
         rate: Messages per second.
         bandwidth: Bytes per second.
         size: Mean size of a message in bytes.
+        latency: Mean time in seconds from sending to receiving, by the clocks of both machines;
+            None if it is not known.
     """
 
     rate: float
     bandwidth: float
     size: float
+    latency: float | None = None
 
 
 def flow_of(stats: BandwidthStats | None) -> Flow | None:
@@ -60,16 +70,29 @@ class _Tap:
 
     def __init__(self, node: Node, token: Token) -> None:
         self._meter = BandwidthMeter()
+        self._ages: deque[int] = deque(maxlen=_AGES)
         self._entity: Entity = subscribe_samples(
             node,
             token.name,
             token.type_name,
             token.type_hash,
-            lambda sample: self._meter.add(sample.size, time.monotonic_ns()),
+            self._receive,
         )
 
+    def _receive(self, sample: Sample) -> None:
+        self._meter.add(sample.size, time.monotonic_ns())
+        try:
+            _, sent, _ = read_attachment(sample.attachment)
+        except DecodeError:  # the sender does not say when it sent it
+            return
+        self._ages.append(time.time_ns() - sent)
+
     def flow(self) -> Flow | None:
-        return flow_of(self._meter.stats(time.monotonic_ns()))
+        flow = flow_of(self._meter.stats(time.monotonic_ns()))
+        ages = self._ages.copy()
+        if flow is None or not ages:
+            return flow
+        return msgspec.structs.replace(flow, latency=sum(ages) / len(ages) / 1e9)
 
     def close(self) -> None:
         self._entity.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from nicegui import run, ui
 
@@ -19,6 +19,8 @@ __all__ = (
     "Frame",
     "address_of",
     "bandwidth_text",
+    "column",
+    "duration_text",
     "empty_state",
     "rate_text",
     "short_rate_text",
@@ -90,6 +92,10 @@ a { color: #2456c8; } body.body--dark a { color: #9dbcff; }
 .q-table__card { background: transparent; box-shadow: none; }
 .q-table__card.rosz-card { background: var(--rosz-card); }
 .rosz-value { color: #1f6f4a; } body.body--dark .rosz-value { color: #7fd1a6; }
+.rosz-state-good { color: #1f8a5b; } .rosz-state-bad { color: #c8342b; }
+.rosz-state-busy { color: #b7791f; } .rosz-state-soft { color: var(--rosz-soft); }
+body.body--dark .rosz-state-good { color: #7fd1a6; }
+body.body--dark .rosz-state-bad { color: #ff8f87; }
 .rosz-level-DEBUG { background: #6b7689; } .rosz-level-INFO { background: #2b6cb0; }
 .rosz-level-WARN { background: #a86a10; } .rosz-level-ERROR { background: #c8342b; }
 .rosz-level-FATAL { background: #7b1fa2; }
@@ -276,6 +282,40 @@ def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.colum
 def address_of(path: str) -> None:
     """Show the address that the page has now, so that it can be kept and sent."""
     ui.run_javascript(f"history.replaceState(null, '', {json.dumps(path)})")
+
+
+def column(
+    name: str, label: str, classes: str = "", *, align: str = "left", sort: str = ""
+) -> dict[str, Any]:
+    """Return a column of a table.
+
+    Args:
+        name: Name of its field in the rows.
+        label: Title.
+        classes: Classes of its cells.
+        align: Alignment.
+        sort: Field with the numbers to sort by; the shown texts if empty.
+    """
+    column: dict[str, Any] = {
+        "name": name,
+        "label": label,
+        "field": name,
+        "align": align,
+        "sortable": True,
+        "classes": classes,
+        "headerClasses": classes.replace("rosz-soft", ""),
+    }
+    if sort:
+        column[":sort"] = f"(a, b, one, other) => one.{sort} - other.{sort}"
+    return column
+
+
+def duration_text(seconds: float) -> str:
+    """Return a time in whole minutes as text, which changes rarely."""
+    minutes = max(0, int(seconds)) // 60
+    if minutes >= 60:  # noqa: PLR2004
+        return f"{minutes // 60} h {minutes % 60} min"
+    return f"{minutes} min" if minutes else "under 1 min"
 
 
 def short_rate_text(rate: float) -> str:

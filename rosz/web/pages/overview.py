@@ -7,19 +7,31 @@ from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
-from rosz.introspect.nodes import list_nodes, machines
+from rosz.introspect.nodes import NodeEntry, find_nodes, kill, list_nodes, machines
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import list_topics
 from rosz.web.model import Findings, System, Traffic
-from rosz.web.pages.layout import Frame, bandwidth_text, empty_state, rate_text
+from rosz.web.pages.launches import LaunchCards, confirm
+from rosz.web.pages.layout import (
+    Frame,
+    bandwidth_text,
+    column,
+    duration_text,
+    empty_state,
+    rate_text,
+)
+from rosz.wire import Kind
 
 __all__ = ("show_overview",)
 
 _PERIOD = 1.0
 _ROWS = 15
+_KILL_CELL = """<q-td :props="props"><q-btn flat dense round size="sm" icon="close"
+:aria-label="'End ' + props.row.name" @click="() => $parent.$emit('kill', props.row)">
+<q-tooltip>End this node</q-tooltip></q-btn></q-td>"""
 _LINK_CELL = """<q-td :props="props"><a :href="props.row.address">{{ props.value }}</a></q-td>"""
-_HOUR, _MINUTE = 3600, 60
 
 
 def show_overview(system: System) -> None:
@@ -36,7 +48,12 @@ def show_overview(system: System) -> None:
             "Start a launch file, a node or an example; it appears here at once:",
             "rosz run turtlesim turtlesim_node",
         )
-        tables = _Tables(traffic)
+        launches = (
+            LaunchCards(frame, frame.use(system.launches))
+            if system.permission.sees_launches
+            else None
+        )
+        tables = _Tables(frame, traffic)
 
     def refresh() -> None:
         survey = graph.survey()
@@ -44,6 +61,8 @@ def show_overview(system: System) -> None:
         own = system.node.name
         rows = tables.update(survey, own)
         empty.set_visibility(graph.complete and not rows)
+        if launches is not None:
+            launches.update()
         tiles.update(survey, own, findings)
         doctor.update()
 
@@ -118,12 +137,15 @@ class _Doctor:
 class _Tables:
     """The tables of nodes and topics."""
 
-    def __init__(self, traffic: Traffic) -> None:
+    def __init__(self, frame: Frame, traffic: Traffic) -> None:
+        self._frame = frame
         self._traffic = traffic
+        self._survey: Survey
         self._box = ui.column().classes("w-full gap-4")
         with self._box:
             self._add_topics()
             self._add_nodes()
+            self._add_machines()
 
     def _add_topics(self) -> None:
         with ui.column().classes("rosz-card w-full p-0 gap-0"):
@@ -144,18 +166,25 @@ class _Tables:
                 ui.table(
                     rows=[],
                     columns=[
-                        _column("name", "Topic"),
-                        _column("type", "Type", "rosz-wide rosz-soft"),
-                        _column("rate", "Rate", "rosz-number", align="right", sort="rate_value"),
-                        _column(
+                        column("name", "Topic"),
+                        column("type", "Type", "rosz-wide rosz-soft"),
+                        column("rate", "Rate", "rosz-number", align="right", sort="rate_value"),
+                        column(
                             "bandwidth",
                             "Bandwidth",
                             "rosz-number",
                             align="right",
                             sort="bandwidth_value",
                         ),
-                        _column("publishers", "Pub", "rosz-number rosz-wide", align="right"),
-                        _column("subscribers", "Sub", "rosz-number rosz-wide", align="right"),
+                        column(
+                            "latency",
+                            "Latency",
+                            "rosz-number rosz-wide",
+                            align="right",
+                            sort="latency_value",
+                        ),
+                        column("publishers", "Pub", "rosz-number rosz-wide", align="right"),
+                        column("subscribers", "Sub", "rosz-number rosz-wide", align="right"),
                     ],
                     row_key="name",
                     pagination=_ROWS,
@@ -175,10 +204,11 @@ class _Tables:
                 ui.table(
                     rows=[],
                     columns=[
-                        _column("name", "Node"),
-                        _column("host", "Machine"),
-                        _column("pid", "Process", "rosz-number", align="right"),
-                        _column("since", "Running for", "rosz-number rosz-wide", align="right"),
+                        column("name", "Node"),
+                        column("buttons", ""),
+                        column("host", "Machine"),
+                        column("pid", "Process", "rosz-number", align="right"),
+                        column("since", "Running for", "rosz-number rosz-wide", align="right"),
                     ],
                     row_key="key",
                     pagination=_ROWS,
@@ -187,12 +217,52 @@ class _Tables:
                 .props("flat dense")
             )
 
+        self.nodes.add_slot("body-cell-buttons", _KILL_CELL)
+        self.nodes.on("kill", self._kill)
+
+    def _add_machines(self) -> None:
+        with ui.column().classes("rosz-card w-full p-0 gap-0"):
+            ui.label("Machines").classes("text-base font-semibold px-4 pt-3")
+            self.machines = (
+                ui.table(
+                    rows=[],
+                    columns=[
+                        column("name", "Machine"),
+                        column("nodes", "Nodes", "rosz-number", align="right"),
+                        column("processes", "Processes", "rosz-number", align="right"),
+                        column("topics", "Topics published", "rosz-number", align="right"),
+                    ],
+                    row_key="name",
+                    pagination=_ROWS,
+                )
+                .classes("w-full")
+                .props("flat dense")
+            )
+
+    async def _kill(self, event: GenericEventArguments) -> None:
+        name, key = event.args["name"], event.args["key"]
+        system = self._frame.system
+        session = system.node.context.session
+
+        def act() -> None:
+            system.permission.check_control(name)
+            for token in find_nodes(self._survey, name):
+                if key.startswith(f"{name} {token.zid} "):
+                    kill(session, token, "ended from a page")
+
+        with self._box:
+            text = "It is asked to shut down, as by rosnode kill. A launch may start it again."
+            if await confirm(f"End {name}?", text, "end"):
+                await self._frame.attempt(act, f"{name} has ended")
+
     def update(self, survey: Survey, own: str) -> int:
         """Show what there is, and return the number of nodes."""
+        self._survey = survey
         topics = [
             self._topic_row(topic.name, topic.type_text, topic.publishers, topic.subscribers)
             for topic in list_topics(t for t in survey.view.tokens if t.node_name != own)
         ]
+        entries = [one for one in list_nodes(survey) if one.name != own]
         nodes = [
             {
                 "key": f"{one.name} {one.session} {one.pid}",
@@ -201,10 +271,14 @@ class _Tables:
                 "pid": one.pid or "—",
                 "since": _since(one.started),
             }
-            for one in list_nodes(survey)
-            if one.name != own
+            for one in entries
         ]
-        for table, rows in ((self.topics, topics), (self.nodes, nodes)):
+        hosts = _machine_rows(survey, entries)
+        for table, rows in (
+            (self.topics, topics),
+            (self.nodes, nodes),
+            (self.machines, hosts),
+        ):
             if table.rows != rows:
                 table.rows = rows
         self._box.set_visibility(bool(nodes))
@@ -214,6 +288,7 @@ class _Tables:
         self, name: str, type_text: str, publishers: tuple[str, ...], subscribers: tuple[str, ...]
     ) -> dict[str, Any]:
         flow = self._traffic.flow(name)
+        latency = None if flow is None else flow.latency
         return {
             "name": name,
             "address": f"/topics?topic={quote(name, safe='/')}",
@@ -222,35 +297,28 @@ class _Tables:
             "rate_value": -1.0 if flow is None else round(flow.rate, 1),
             "bandwidth": "—" if flow is None else bandwidth_text(flow.bandwidth),
             "bandwidth_value": -1.0 if flow is None else round(flow.bandwidth),
+            "latency": "—" if latency is None else f"{latency * 1e3:.1f} ms",
+            "latency_value": -1.0 if latency is None else round(latency, 4),
             "publishers": len(publishers),
             "subscribers": len(subscribers),
         }
 
 
-def _column(
-    name: str, label: str, classes: str = "", *, align: str = "left", sort: str = ""
-) -> dict[str, Any]:
-    column: dict[str, Any] = {
-        "name": name,
-        "label": label,
-        "field": name,
-        "align": align,
-        "sortable": True,
-        "classes": classes,
-        "headerClasses": classes.replace("rosz-soft", ""),
-    }
-    if sort:
-        column[":sort"] = f"(a, b, one, other) => one.{sort} - other.{sort}"
-    return column
+def _machine_rows(survey: Survey, nodes: list[NodeEntry]) -> list[dict[str, Any]]:
+    published: dict[str, set[str]] = {}
+    for token in survey.view.entities(Kind.PUBLISHER):
+        published.setdefault(survey.host(token), set()).add(token.name)
+    return [
+        {
+            "name": host,
+            "nodes": sum(one.host == host for one in nodes),
+            "processes": len({one.pid for one in nodes if one.host == host}),
+            "topics": len(published.get(host, ())),
+        }
+        for host in machines(nodes)
+    ]
 
 
 def _since(started: int) -> str:
     """Return how long ago a time in nanoseconds since the Unix epoch was."""
-    if not started:
-        return "—"
-    seconds = max(0, int(time.time() - started / 1e9))
-    if seconds >= _HOUR:
-        return f"{seconds // _HOUR} h {seconds % _HOUR // _MINUTE} min"
-    if seconds >= _MINUTE:
-        return f"{seconds // _MINUTE} min"
-    return "under 1 min"
+    return duration_text(time.time() - started / 1e9) if started else "—"

@@ -11,6 +11,7 @@ from rosz.web.pages.console import show_console
 from rosz.web.pages.drive import show_drive
 from rosz.web.pages.graph import show_graph
 from rosz.web.pages.images import show_images
+from rosz.web.pages.launches import show_output
 from rosz.web.pages.overview import show_overview
 from rosz.web.pages.parameters import show_parameters
 from rosz.web.pages.plot import show_plot
@@ -27,6 +28,7 @@ def add_pages(system: System) -> None:
     """Give every page its address."""
     _add_pages_of_data(system)
     _add_pages_of_nodes(system)
+    _add_pages_of_launches(system)
     _add_pictures(system)
 
     @ui.page("/")
@@ -36,6 +38,12 @@ def add_pages(system: System) -> None:
     @ui.page("/graph")
     def graph(content: str = "nodes", nodes: str = "", topics: str = "", group: int = 0) -> None:
         show_graph(system, content, nodes, topics, group)
+
+
+def _add_pages_of_launches(system: System) -> None:
+    @ui.page("/output")
+    def output(node: str = "") -> None:
+        show_output(system, node)
 
 
 def _add_pages_of_data(system: System) -> None:

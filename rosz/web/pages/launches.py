@@ -1,0 +1,250 @@
+"""Running launches: their nodes with what they use, and the output of one of them."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+from urllib.parse import urlencode
+
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from rosz.launch.run import NodeStatus
+from rosz.web.model import Launches, NodeOutput, RunningLaunch, System
+from rosz.web.pages.layout import Frame, column, duration_text, size_text
+
+__all__ = ("LaunchCards", "confirm", "show_output")
+
+_LINES = 1000
+_PERIOD = 0.4
+_LONGEST_LINE = 4096
+_STATE_CELL = """<q-td :props="props"><span :class="'rosz-state-' + props.row.kind">
+{{ props.value }}</span><div v-if="props.row.detail" class="rosz-soft whitespace-normal"
+style="font-size: .75rem; max-width: 20rem">{{ props.row.detail }}</div></q-td>"""
+_NAME_CELL = """<q-td :props="props"><a :href="props.row.address">{{ props.value }}</a>
+<div v-if="props.row.members" class="rosz-soft whitespace-normal" style="font-size: .75rem">
+{{ props.row.members }}</div></q-td>"""
+_BUTTONS_CELL = """<q-td :props="props" class="whitespace-nowrap">
+<q-btn flat dense round size="sm" :icon="props.row.pid === '—' ? 'play_arrow' : 'restart_alt'"
+ :aria-label="(props.row.pid === '—' ? 'Start ' : 'Restart ') + props.row.name"
+ @click="() => $parent.$emit('restart', props.row.name)"><q-tooltip>
+ {{ props.row.pid === '—' ? 'Start' : 'Restart' }}</q-tooltip></q-btn>
+<q-btn flat dense round size="sm" icon="stop" :disable="props.row.pid === '—'"
+ :aria-label="'Stop ' + props.row.name"
+ @click="() => $parent.$emit('stop', props.row.name)"><q-tooltip>Stop</q-tooltip></q-btn>
+</q-td>"""
+_KINDS = {"running": "good", "failed": "bad", "ended": "soft"}
+
+
+class LaunchCards:
+    """A card for each running launch.
+
+    Args:
+        frame: The page.
+        launches: The launches.
+    """
+
+    def __init__(self, frame: Frame, launches: Launches) -> None:
+        self._frame = frame
+        self._launches = launches
+        self._tables: dict[str, ui.table] = {}
+        self._cards: dict[str, ui.column] = {}
+        self._box = ui.column().classes("w-full gap-4")
+        with self._box:
+            self._fault = ui.label("").classes("rosz-card w-full p-3 text-negative")
+
+    def update(self) -> None:
+        """Show what runs now."""
+        found = {one.key: one for one in self._launches.found or ()}
+        if self._fault.text != self._launches.fault:
+            self._fault.set_text(self._launches.fault)
+        self._fault.set_visibility(bool(self._launches.fault))
+        self._box.set_visibility(bool(found or self._launches.fault))
+        for key in self._cards.keys() - found:
+            self._cards.pop(key).delete()
+            del self._tables[key]
+        for key, launch in found.items():
+            if key not in self._cards:
+                self._add(launch)
+            rows = [_row(launch, node) for node in launch.status.nodes]
+            if self._tables[key].rows != rows:
+                self._tables[key].rows = rows
+
+    def _add(self, launch: RunningLaunch) -> None:
+        status = launch.status
+        files = ", ".join(file.rpartition("/")[2] for file in status.files) or "launch"
+        with self._box, ui.column().classes("rosz-card w-full p-0 gap-0") as card:
+            with ui.row().classes("w-full items-baseline px-4 pt-3 gap-x-3 gap-y-0"):
+                ui.label(files).classes("text-base font-semibold").tooltip(", ".join(status.files))
+                ui.label(f"launch {status.pid} on {status.host}").classes("rosz-soft text-sm")
+            table = (
+                ui.table(
+                    rows=[],
+                    columns=[
+                        column("name", "Node"),
+                        column("state", "State"),
+                        column("buttons", ""),
+                        column("type", "Type", "rosz-wide rosz-soft"),
+                        column("pid", "Process", "rosz-number rosz-wide", align="right"),
+                        column("restarts", "Restarts", "rosz-number rosz-wide", align="right"),
+                        column("cpu", "CPU", "rosz-number", align="right"),
+                        column("memory", "Memory", "rosz-number", align="right"),
+                        column("uptime", "Running for", "rosz-number rosz-wide", align="right"),
+                        column("machine", "Machine", "rosz-wide"),
+                    ],
+                    row_key="name",
+                    pagination=20,
+                )
+                .classes("w-full")
+                .props("flat dense")
+            )
+        table.add_slot("body-cell-name", _NAME_CELL)
+        table.add_slot("body-cell-state", _STATE_CELL)
+        table.add_slot("body-cell-buttons", _BUTTONS_CELL)
+        table.on("restart", lambda event: self._request(launch.key, "restart", event))
+        table.on("stop", lambda event: self._request(launch.key, "stop", event))
+        self._cards[launch.key], self._tables[launch.key] = card, table
+
+    async def _request(
+        self, key: str, action: Literal["restart", "stop"], event: GenericEventArguments
+    ) -> None:
+        name = str(event.args)
+        launch = next((one for one in self._launches.found or () if one.key == key), None)
+        if launch is None:
+            ui.notify(f"the launch of '{name}' has ended", type="negative")
+            return
+        text = self._launches.describe(launch, name, action)
+        with self._box:
+            if text and not await confirm(f"{action.capitalize()} {name}?", text, action):
+                return
+            done = "runs again" if action == "restart" else "is stopped"
+            await self._frame.attempt(
+                lambda: self._launches.act(key, action, name), f"{name} {done}"
+            )
+        self.update()
+
+
+async def confirm(title: str, text: str, button: str) -> bool:
+    """Ask whether something shall be done, and return the answer.
+
+    Args:
+        title: The question.
+        text: What it means.
+        button: Text of the button that does it.
+    """
+    with ui.dialog() as dialog, ui.card().classes("rosz-card max-w-lg"):
+        ui.label(title).classes("text-base font-semibold")
+        ui.label(text)
+        with ui.row().classes("w-full justify-end"):
+            ui.button("Cancel", on_click=lambda: dialog.submit(False)).props("flat no-caps")
+            ui.button(button.capitalize(), on_click=lambda: dialog.submit(True)).props(
+                "no-caps autofocus"
+            )
+    answer = bool(await dialog)
+    dialog.delete()
+    return answer
+
+
+def _row(launch: RunningLaunch, node: NodeStatus) -> dict[str, Any]:
+    share = launch.shares.get(node.name)
+    runs = bool(node.pid)
+    return {
+        "name": node.name,
+        "address": f"/output?{urlencode({'node': node.name}, safe='/')}",
+        "members": ", ".join(node.members),
+        "state": node.state,
+        "kind": _KINDS.get(node.state, "busy"),
+        "detail": node.detail,
+        "type": node.type,
+        "pid": node.pid or "—",
+        "restarts": node.restarts,
+        "cpu": f"{share:.0%}" if runs and share is not None else "—",
+        "memory": size_text(node.memory) if runs else "—",
+        "uptime": duration_text(node.uptime) if runs else "—",
+        "machine": node.machine,
+    }
+
+
+def show_output(system: System, node: str) -> None:
+    """Build the page of the output of a node.
+
+    Args:
+        system: The system.
+        node: Full name of the node.
+    """
+    frame = Frame(system, "Output", "/")
+    with frame.content:
+        if not system.permission.sees_launches:
+            frame.show_fault("the rules of this machine do not let this page see launches")
+            return
+        _Output(frame, system, node)
+
+
+class _Output:
+    """The newest lines, and the buttons."""
+
+    def __init__(self, frame: Frame, system: System, node: str) -> None:
+        self._frame = frame
+        self._name = node
+        self._launches = frame.use(system.launches)
+        self._output = NodeOutput(system.node, node)
+        frame.keep(self._output)
+        self._waiting = ""
+        with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+            ui.link("Overview", "/")
+            ui.label(node).classes("font-semibold")
+            self._state = ui.label("").classes("rosz-soft")
+            ui.space()
+            self._pause = ui.switch("Pause").props("dense")
+            ui.button("Restart", icon="restart_alt", on_click=lambda: self._act("restart")).props(
+                "flat dense no-caps"
+            )
+            ui.button("Stop", icon="stop", on_click=lambda: self._act("stop")).props(
+                "flat dense no-caps"
+            )
+        self._empty = ui.label("It has written nothing yet.").classes("rosz-soft")
+        self._log = (
+            ui.log(max_lines=_LINES)
+            .classes("rosz-card rosz-mono w-full")
+            .style("height: calc(100vh - 190px)")
+        )
+        self._log.props('role=log aria-label="Output"')
+        frame.every(_PERIOD, self._refresh)
+
+    def _launch(self) -> RunningLaunch | None:
+        return next(
+            (one for one in self._launches.found or () if one.find(self._name) is not None), None
+        )
+
+    def _refresh(self) -> None:
+        launch = self._launch()
+        status = None if launch is None else launch.find(self._name)
+        parts = [] if status is None else [status.state, status.detail]
+        parts.append(self._output.state)
+        if self._output.skipped:
+            parts.append(f"{size_text(self._output.skipped)} left out")
+        text = " · ".join(part for part in parts if part)
+        if self._state.text != text:
+            self._state.set_text(text)
+        if self._pause.value:
+            return
+        text = self._output.take()
+        *lines, self._waiting = (self._waiting + text).split("\n")
+        # A line without an end, such as a question.
+        if self._waiting and (not text or len(self._waiting) > _LONGEST_LINE):
+            lines, self._waiting = [self._waiting], ""
+        if lines:
+            self._empty.set_visibility(False)
+            self._log.push("\n".join(lines[-_LINES:]))
+
+    async def _act(self, action: Literal["restart", "stop"]) -> None:
+        launch = self._launch()
+        if launch is None:
+            ui.notify(f"no launch runs '{self._name}'", type="negative")
+            return
+        text = self._launches.describe(launch, self._name, action)
+        if text and not await confirm(f"{action.capitalize()} {self._name}?", text, action):
+            return
+        await self._frame.attempt(
+            lambda: self._launches.act(launch.key, action, self._name),
+            f"{self._name} {'runs again' if action == 'restart' else 'is stopped'}",
+        )
