@@ -15,9 +15,9 @@ from rosz.graph import View
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
-from rosz.node import Node
+from rosz.node import MessageInfo, Node
 from rosz.node.action_watch import LONGEST_SILENCE, ServerWatch
-from rosz.wire import Kind
+from rosz.wire import Kind, format_token, gid
 
 __all__ = ("ActionClient", "ClientGoal", "CommState")
 
@@ -231,7 +231,10 @@ class ActionClient:
         )
         self._goal_publisher = node.publisher(f"{self.name}/goal", types.action_goal)
         self._cancel_publisher = node.publisher(f"{self.name}/cancel", GoalID)
-        status = node.subscription(f"{self.name}/status", GoalStatusArray, self._receive_status)
+        self._heard = b"", 0
+        status = node.subscription(
+            f"{self.name}/status", GoalStatusArray, self._receive_status, with_info=True
+        )
         self._status = status
         self._subscriptions = [
             status,
@@ -244,6 +247,9 @@ class ActionClient:
     def wait_for_server(self, timeout: float | None = None) -> bool:
         """Wait until a server of the action is connected.
 
+        A server of ROS 1's protocol is connected when it has published its status, which it does
+        when it is ready for goals, and when its other topics are connected.
+
         Args:
             timeout: Time limit in seconds; none when not given or 0.
 
@@ -255,10 +261,19 @@ class ActionClient:
         def is_connected(view: View) -> bool:
             if self._ros2 is not None and self._ros2.is_served():
                 return True
-            return all(view.publishers(topic) for topic in topics) and all(
-                publisher.subscribers()
-                for publisher in (self._goal_publisher, self._cancel_publisher)
+            publishers = view.publishers(self._status.name)
+            servers = [one.node_name for one in publishers if gid(format_token(one)) == heard()]
+            ends = (
+                *(view.publishers(topic) for topic in topics[1:]),
+                *(one.subscribers() for one in (self._goal_publisher, self._cancel_publisher)),
             )
+            return any(
+                all(any(token.node_name == server for token in tokens) for tokens in ends)
+                for server in servers
+            )
+
+        def heard() -> bytes:
+            return self._heard[0]
 
         graph = self.node.context.graph
         try:
@@ -359,7 +374,13 @@ class ActionClient:
                 goal.finish(GoalStatus(goal.id, GoalStatus.LOST, text), None)
         self._served = served or (self._served and silence > 0)
 
-    def _receive_status(self, message: GoalStatusArray) -> None:
+    def _receive_status(self, message: GoalStatusArray, info: MessageInfo) -> None:
+        server, sequence = self._heard
+        if info.gid == server and info.sequence < sequence:
+            return  # a newer one has come from the cache of the server
+        self._heard = info.gid, info.sequence
+        if info.gid != server:
+            self.node.context.graph.check_again()
         self._served = True
         self._watch.note_answer()
         for goal in list(self._goals.values()):

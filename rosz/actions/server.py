@@ -17,7 +17,7 @@ from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
-from rosz.qos import QoS
+from rosz.qos import LATCHED, QoS
 
 __all__ = ("ActionServer", "ServerGoal")
 
@@ -218,7 +218,9 @@ class ActionServer:
                 "feedback": types.action_feedback,
             }
             self._publishers = {
-                topic: node.publisher(f"{self.name}/{topic}", kind, qos=qos)
+                topic: node.publisher(
+                    f"{self.name}/{topic}", kind, qos=LATCHED if topic == "status" else qos
+                )
                 for topic, kind in kinds.items()
             }
             self._others = [
@@ -230,7 +232,6 @@ class ActionServer:
             if self.status_frequency > 0:
                 period = 1 / self.status_frequency
                 self._others.append(node.timer(period, lambda _: self.publish_status()))
-            self.publish_status()
             if types.action is not None and self._has_ros2:
                 self._ros2 = node.keep(
                     Ros2Server(
@@ -243,6 +244,7 @@ class ActionServer:
                     )
                 )
                 self._others.append(self._ros2)
+            self.publish_status()  # clients take it for a sign that the server is ready
 
     def stop(self) -> None:
         """Stop receiving goals; a server that is not started does nothing."""

@@ -157,6 +157,10 @@ class Graph:
 
         return stop
 
+    def check_again(self) -> None:
+        """Let all who wait check their conditions, since these depend on more than the graph."""
+        self._interests.check_again()
+
     def wait_for(
         self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
     ) -> View:

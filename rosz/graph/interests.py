@@ -261,11 +261,18 @@ class Interests:
             interest.version += 1
         self._set_complete(interest)
 
-    def _set_complete(self, interest: Interest) -> None:
+    def check_again(self) -> None:
+        """Let all who wait check their conditions."""
+        self._events.put(self._note_change)
+
+    def _note_change(self) -> None:
         with self.changed:
-            interest.complete = True
             self._version += 1
             self.changed.notify_all()
+
+    def _set_complete(self, interest: Interest) -> None:
+        interest.complete = True
+        self._note_change()
 
     def _sleep(self, seen: int, timeout: float) -> None:
         """Wait until there is another version than the one that was seen."""

@@ -60,7 +60,8 @@ class ServerWatch:
         self._on_check = on_check
         self._log = log
         self._look = self._query if queries else self._wait
-        self._lock = threading.Lock()
+        self._lock = threading.Condition()
+        self._closed = False
         self._watching = False
         self._silent = False
         self._heard = 0.0
@@ -90,12 +91,29 @@ class ServerWatch:
         """Note that something came from the server."""
         with self._lock:
             silence, self._silent, self._heard = self.silence, False, time.monotonic()
+            self._lock.notify_all()
         if silence:
             text = "the server of action '%s' answers again after %.1f s"
             self._log.info(text, self._action, silence)
 
+    def wait_for_answer(self) -> bool:
+        """Wait until a silent server answers; return whether it did before its goals are given up.
+
+        Raises:
+            ClosedError: The watch was closed meanwhile.
+        """
+        with self._lock:
+            left = LONGEST_SILENCE - self.silence
+            answers = self._lock.wait_for(lambda: self._closed or not self._silent, left)
+            if self._closed:
+                raise ClosedError(f"the client of action '{self._action}' is closed")
+            return answers
+
     def close(self) -> None:
         """End the watch; a second call has no effect."""
+        with self._lock:
+            self._closed = True
+            self._lock.notify_all()
         self._cancel.cancel()
         self._worker.close()
 

@@ -20,7 +20,7 @@ from rosz.actions import (
     SimpleActionServer,
 )
 from rosz.errors import UsageError
-from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
+from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.std_msgs.msg import String
 from rosz.packages import PackageIndex
 from rosz.typestore import TypeStore
@@ -220,6 +220,35 @@ def test_a_server_that_is_killed_or_stopped(network: Network, world: World, stop
     program.kill()
     assert goal.wait(TIMEOUT)
     assert (goal.status.status, goal.status.text) == (GoalStatus.LOST, "the server ended")
+
+
+def test_a_server_is_ready_once_it_has_published_its_status(world: World) -> None:
+    node = world.server_node
+    types = ActionTypes.of(world.count.action, node.context.types)
+    result = node.publisher("count/result", types.action_result)
+    node.publisher("count/feedback", types.action_feedback)
+    node.subscription("count/goal", types.action_goal, lambda _: None)
+    node.subscription("count/cancel", GoalID, lambda _: None)
+    status = node.publisher("count/status", GoalStatusArray)
+    client = ActionClient(world.client_node, "count", world.count.action)
+    for publisher in (status, result):
+        publisher.wait_for_subscribers(1, TIMEOUT)
+    assert not client.wait_for_server(0.5)
+    found: SimpleQueue[bool] = SimpleQueue()
+    waiting = threading.Thread(target=lambda: found.put(client.wait_for_server(TIMEOUT)))
+    waiting.start()
+    status.publish()
+    assert found.get()
+    waiting.join()
+    status.close()
+    eventually(lambda: not client.wait_for_server(0.1))  # the status was that of another server
+
+
+def test_a_late_client_need_not_wait_for_the_next_status(world: World) -> None:
+    server = ActionServer(world.server_node, "count", world.count.action, status_frequency=0)
+    server.start()
+    world.client()
+    server.stop()
 
 
 def test_callbacks_that_fail_do_not_stop_a_goal(world: World) -> None:
