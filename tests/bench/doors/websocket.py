@@ -10,45 +10,24 @@ from pathlib import Path
 
 from network import Network, Program, eventually, free_port
 
+from ..clouds import CLOUD_BYTES, Copies, Listener, Readers, publishing_times  # noqa: TID252  # no package
 from ..figures import OWN, Figure, percentile  # noqa: TID252  # tests is no package
 
 __all__ = ("clouds", "idle")
 
 TIMEOUT = 120.0
 PLAIN = "one node"
-ENCODINGS = ("cbor-raw", "cbor", "none")
+CONTROL = "copies alone"
+ENCODINGS = {"cbor-raw": CLOUD_BYTES, "none": CLOUD_BYTES * 4 // 3}
+"""Bytes of a cloud, by the encoding that clients ask for."""
 
-TALKER = """
-import sys, threading, time, json
-from rosz.node import Node
-from rosz.msgs.sensor_msgs.msg import PointCloud2
-size, period, count = int(sys.argv[1]), 1 / float(sys.argv[2]), int(sys.argv[3])
-with Node("talker") as node:
-    publisher = node.publisher("/cloud", PointCloud2, queue_size=1)
-    cloud = PointCloud2(width=size, data=bytes(size))
-    publisher.wait_for_subscribers(1, 60)
-    print("found", flush=True)
-    sys.stdin.readline()
-    times = []
-    for _ in range(count):
-        begun = time.perf_counter()
-        publisher.publish(cloud)
-        times.append(time.perf_counter() - begun)
-        time.sleep(max(0, period - times[-1]))
-    print("times", json.dumps(times))
-    sys.stdin.readline()
-"""
-LISTENER = """
-import sys
-from rosz.node import Node
-from rosz.msgs.sensor_msgs.msg import PointCloud2
-seen = []
-with Node("listener") as node:
-    node.subscription("/cloud", PointCloud2, seen.append, raw=True, queue_size=1)
-    print("ready", flush=True)
-    sys.stdin.readline()
-    print("seen", len(seen))
-"""
+HANDSHAKE = (
+    b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+)
+_ROUNDS = 2
+_MESSAGES = 10 * _ROUNDS
+
 CLIENTS = """
 import asyncio, json, sys
 import websockets
@@ -70,44 +49,42 @@ asyncio.run(main())
 """
 
 
-def clouds(
-    rounds: int, *, size: int = 10_000_000, rate: float = 5.0, count: int = 100, clients: int = 8
-) -> list[Figure]:
-    """Measure how long a publisher of clouds takes, for one node and for clients of a bridge."""
+def clouds(rounds: int, *, clients: int = 8) -> list[Figure]:
+    """Measure how long a publisher of clouds takes, for one node and for clients of a bridge.
+
+    The control is a node that copies as many bytes to as many sockets, and nothing else.
+    """
     figures = []
-    for encoding in ENCODINGS:
+    for encoding, size in ENCODINGS.items():
         name = f"10 MB to {clients} clients as {encoding}"
-        middle = Figure(f"{name}: publishing, median", "ms", {PLAIN: "about 1"})
-        slow = Figure(f"{name}: publishing, p99", "ms", {PLAIN: "about 1"})
-        came = Figure(f"{name}: came, of {count}", "messages", {PLAIN: "-"})
-        figures += [middle, slow, came]
-        for _ in range(rounds):
-            for system in (PLAIN, OWN):
-                times, seen = _stream(system, encoding, size, rate, count, clients)
-                middle.add(system, statistics.median(times))
-                slow.add(system, percentile(times, 99))
-                came.add(system, seen)
+        asked = {PLAIN: "about 1", CONTROL: "about 1"}
+        middle = Figure(f"{name}: publishing, median", "ms", asked)
+        slow = Figure(f"{name}: publishing, p99", "ms", asked)
+        seen = Figure(f"{name}: came to each, of {_MESSAGES * rounds}", "messages", asked)
+        network = Network()
+        try:
+            sinks = {
+                PLAIN: Listener(network),
+                CONTROL: Copies(network, clients),
+                OWN: Readers(network, _bridge(network)[1], clients, _subscribing(encoding), size),
+            }
+            times, came = publishing_times(network, sinks, _ROUNDS * rounds)
+        finally:
+            network.close()
+        for system, found in times.items():
+            for one in found:
+                middle.add(system, statistics.median(one))
+            slow.add(system, percentile([value for one in found for value in one], 99))
+            seen.add(system, came[system])
+        figures += [middle, slow, seen]
     return figures
 
 
-def _stream(
-    system: str, encoding: str, size: int, rate: float, count: int, clients: int
-) -> tuple[list[float], float]:
-    network = Network()
-    try:
-        if system == PLAIN:
-            listener = network.program(LISTENER)
-        else:
-            port = _bridge(network)[1]
-            listener = network.program(CLIENTS, str(port), encoding, str(clients))
-        talker = network.program(TALKER, str(size), str(rate), str(count))
-        talker.wait_for("found", TIMEOUT)
-        talker.say("go")
-        times = json.loads(talker.wait_for("times", TIMEOUT).partition(" ")[2])
-        listener.say("end")
-        return times, float(listener.wait_for("seen", TIMEOUT).split()[1])
-    finally:
-        network.close()
+def _subscribing(encoding: str) -> bytes:
+    """Return the first bytes of a client that subscribes to clouds."""
+    operation = {"op": "subscribe", "topic": "/cloud", "type": "sensor_msgs/PointCloud2"}
+    text = json.dumps({**operation, "compression": encoding}).encode()
+    return HANDSHAKE + b"\x81\xfe" + len(text).to_bytes(2, "big") + bytes(4) + text
 
 
 def _bridge(network: Network) -> tuple[Program, int]:
