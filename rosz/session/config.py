@@ -25,6 +25,8 @@ from rosz.errors import UsageError
 from rosz.wire import Endpoint, id_prefix
 
 if TYPE_CHECKING:
+    import zenoh
+
     from rosz.security import KeyFolder
 
 __all__ = (
@@ -32,12 +34,14 @@ __all__ = (
     "SessionConfig",
     "addresses_of",
     "connect_endpoint",
+    "insert_setting",
     "is_own",
     "keys_of",
     "listen_endpoints",
     "loopback_interfaces",
     "new_id",
     "overrides",
+    "read_setting",
     "zenoh_settings",
 )
 
@@ -272,6 +276,16 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
             },
         },
     }
+
+
+def read_setting(settings: zenoh.Config, path: str) -> Any:
+    """Return a value of a Zenoh configuration."""
+    return msgspec.json.decode(settings.get_json(path))
+
+
+def insert_setting(settings: zenoh.Config, path: str, value: object) -> None:
+    """Replace a value of a Zenoh configuration."""
+    settings.insert_json5(path, msgspec.json.encode(value).decode())
 
 
 def _open_timeout_ms(mode: str, *, local: bool) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import threading
@@ -19,9 +18,11 @@ from rosz.session.config import (
     EPHEMERAL,
     SessionConfig,
     connect_endpoint,
+    insert_setting,
     loopback_interfaces,
     new_id,
     overrides,
+    read_setting,
     zenoh_settings,
 )
 from rosz.session.declared import translate_errors
@@ -178,10 +179,10 @@ def _listen_directly(settings: zenoh.Config, rendezvous: str, own: LocalPeer | N
         raise TransportError(f"nobody can meet at '{endpoint}': there is no folder '{folder}'")
     if is_private(rendezvous):
         remove_abandoned_sockets(rendezvous)
-    listen = json.loads(settings.get_json("listen/endpoints"))
+    listen = read_setting(settings, "listen/endpoints")
     if EPHEMERAL in listen and (direct := direct_endpoint(rendezvous, own)):
         listen[listen.index(EPHEMERAL)] = direct
-        settings.insert_json5("listen/endpoints", json.dumps(listen))
+        insert_setting(settings, "listen/endpoints", listen)
 
 
 def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -192,7 +193,7 @@ def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
         UsageError: The override text is malformed, or a protocol cannot use keys.
     """
     settings = _settings(config)
-    found = [json.loads(settings.get_json(f"{way}/endpoints")) for way in ("listen", "connect")]
+    found = [read_setting(settings, f"{way}/endpoints") for way in ("listen", "connect")]
     listen, connect = (
         # A configuration file may list them by mode.
         tuple((endpoints.get(config.mode) if isinstance(endpoints, dict) else endpoints) or ())
@@ -208,7 +209,7 @@ def outlasted_silence(config: SessionConfig) -> float:
         TransportError: A configuration value is refused.
         UsageError: The override text is malformed, or a protocol cannot use keys.
     """
-    sending = json.loads(_settings(config).get_json("transport/link/tx"))
+    sending = read_setting(_settings(config), "transport/link/tx")
     # The last message may be as old as the period in which an idle link sends one.
     return float(sending["lease"] * (1 - 1 / sending["keep_alive"]) / 1000)
 
@@ -220,6 +221,8 @@ def settings_text(config: SessionConfig) -> str:
         TransportError: A configuration value is refused.
         UsageError: The override text is malformed, or a protocol cannot use keys.
     """
+    import json
+
     return json.dumps(_given(json.loads(str(_settings(config)))), indent=2)
 
 
@@ -232,7 +235,7 @@ def _given(value: Any) -> Any:
 
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
     if settings.get_json("id") == "null":
-        settings.insert_json5("id", json.dumps(new_id(config)))
+        insert_setting(settings, "id", new_id(config))
     return zenoh.open(settings)
 
 
@@ -241,13 +244,14 @@ def _settings(config: SessionConfig) -> zenoh.Config:
         if config.config_file:
             settings = zenoh.Config.from_file(config.config_file)
         else:
-            settings = zenoh.Config.from_json5(json.dumps(zenoh_settings(config)))
+            text = msgspec.json.encode(zenoh_settings(config)).decode()
+            settings = zenoh.Config.from_json5(text)
         if config.keys is not None:
             from rosz.security import access_control
 
             rules = access_control(config.keys.rules, loopback_interfaces())
-            settings.insert_json5("access_control", json.dumps(rules))
-            settings.insert_json5("transport/link/tls", json.dumps(_tls(config.keys)))
+            insert_setting(settings, "access_control", rules)
+            insert_setting(settings, "transport/link/tls", _tls(config.keys))
         for path, text in overrides(config.override).items():
             settings.insert_json5(path, text)
     return settings

@@ -30,7 +30,6 @@ What happens without them:
 from __future__ import annotations
 
 import fcntl
-import json
 import logging
 import os
 import re
@@ -52,7 +51,7 @@ import zenoh
 from rosz.errors import TransportError
 from rosz.lifecycle import Closable
 from rosz.session.channels import declare_rare
-from rosz.session.config import SessionConfig
+from rosz.session.config import SessionConfig, insert_setting, read_setting
 from rosz.session.declared import CallbackThread
 from rosz.session.local_peers import (
     LocalPeers,
@@ -175,8 +174,8 @@ def connect_to_running(settings: zenoh.Config, peers: LocalPeers, config: Sessio
     ):
         return
     running = [f"{endpoint}#{_RARE_RETRIES}" for endpoint in peers.running]
-    connect = [*running, *json.loads(settings.get_json("connect/endpoints"))]
-    settings.insert_json5("connect/endpoints", json.dumps(connect))
+    connect = [*running, *read_setting(settings, "connect/endpoints")]
+    insert_setting(settings, "connect/endpoints", connect)
     settings.insert_json5("connect/timeout_ms", "-1")  # in the background
 
 

@@ -14,7 +14,6 @@ python = time.process_time()
 
 # ruff: noqa: E402  # the time of the imports is measured
 import os
-import statistics
 import sys
 import threading
 from collections.abc import Callable
@@ -39,6 +38,8 @@ def tell(word: str, value: float) -> None:
 
 def median_set(node: rosz.Node, others: int) -> float:
     """Return the seconds that a set takes which so many others acknowledge."""
+    import statistics  # which others need not import
+
     while len(node.context.params.members()) < others:
         time.sleep(0.01)
     taken = []
