@@ -19,6 +19,7 @@ __all__ = ("LONG", "ROBOT", "THEMES", "World", "open_browser", "set_screen", "ta
 ROBOT = """
 import math
 import rosz
+from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import Float64, String
@@ -48,11 +49,22 @@ def reconfigured(config, level):
     return config
 
 
+def count(goal):
+    print("counts to", goal.request.order, flush=True)
+    sequence = [0, 1]
+    while len(sequence) < goal.request.order:
+        sequence.append(sequence[-1] + sequence[-2])
+        goal.feedback(Fibonacci.Feedback(sequence))
+    goal.wait_for_cancel(3600)
+    goal.canceled(Fibonacci.Result(sequence))
+
+
 with rosz.Node("robot") as node:
     chatter = node.publisher("chatter", String)
     wave = node.publisher("wave", Float64)
     node.subscription("cmd_vel", Twist, lambda got: print("drives", got.linear.x, flush=True))
     node.service("enable", SetBool, lambda request: SetBool.Response(True, f"is {request.data}"))
+    node.action_server("count", Fibonacci, count)
     node.params.set("~rate", 20)
     node.params.set("~gains", {"p": 1.5, "names": ["a", "b"], "on": True})
     node.params.watch("~rate", lambda change: print("rate is", change.new, flush=True))

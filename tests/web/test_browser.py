@@ -31,6 +31,7 @@ def world() -> Iterator[World]:
 
 
 SEEN = {
+    "/actions": ("/count", "example_interfaces/Fibonacci", "order"),
     "/": ("/chatter", "/robot", "std_msgs/String", "Hz"),
     "/graph": ("/chatter", "/robot", "20 Hz"),
     "/topics": ("data", "std_msgs/String", "hello"),
@@ -44,6 +45,7 @@ SEEN = {
     "/services": ("/enable", "std_srvs/SetBool"),
 }
 QUERY = {
+    "/actions": "?action=/count",
     "/graph": "?content=all",
     "/drive": "?topic=/cmd_vel",
     "/images": "?topics=/camera",
@@ -139,6 +141,29 @@ def test_the_graph_tells_of_what_is_clicked(world: World) -> None:
         ".dispatchEvent(new MouseEvent('click', {bubbles: true}))"
     )
     world.should_see("Type: std_msgs/String", "Publishers:")
+    assert world.messages() == []
+
+
+def test_a_goal_is_sent_followed_and_canceled(
+    world: World, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    set_screen(world.browser, "laptop", "light")
+    world.open("/actions?action=/count")
+    world.should_hold("textarea", "order: 0")
+    world.fill("input[aria-label=order]", "7")
+    world.should_hold("textarea", "order: 7")
+    world.click("Send goal")
+    world.robot.wait_for("counts to 7", LONG)
+    world.should_see("executing", "[0, 1, 1, 2, 3, 5, 8]", "Earlier feedback")
+    folder = tmp_path_factory.getbasetemp() / "artefacts"
+    for screen, theme in (*THEMES, ("laptop", "dark"), ("phone", "light")):
+        set_screen(world.browser, screen, theme)
+        world.open("/actions?action=/count")  # the goal is of the server of the page
+        world.should_see("executing", "[0, 1, 1, 2, 3, 5, 8]")
+        take_picture(world.browser, folder, f"goal-{screen}-{theme}")
+    world.should_see("Send goal")
+    world.click("Cancel")
+    world.should_see("canceled")
     assert world.messages() == []
 
 

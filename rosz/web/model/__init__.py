@@ -4,6 +4,7 @@ What costs something is open only while a page uses it (`Shared`). Queues are bo
 newest wins. Pages read what they show at their own pace, so that a slow browser holds nothing up.
 """
 
+from rosz.web.model.actions import ActionRow, Actions, ActionUse, GoalRow, SentGoal
 from rosz.web.model.calling import call_service, service_type
 from rosz.web.model.console import LogBook
 from rosz.web.model.driving import Driver
@@ -24,11 +25,15 @@ from rosz.web.model.traffic import Traffic
 
 __all__ = (
     "IMAGE_TYPES",
+    "ActionRow",
+    "ActionUse",
+    "Actions",
     "Driver",
     "Findings",
     "Form",
     "FormField",
     "Frames",
+    "GoalRow",
     "ImageWatch",
     "Launches",
     "LogBook",
@@ -40,6 +45,7 @@ __all__ = (
     "Reconfiguration",
     "RunningLaunch",
     "Sending",
+    "SentGoal",
     "Shared",
     "System",
     "TopicWatch",

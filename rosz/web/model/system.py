@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rosz.introspect.survey import Survey
+from rosz.web.model.actions import Actions
 from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
 from rosz.web.model.frames import Frames
@@ -71,6 +72,7 @@ class System:
         parameters: The parameters of all nodes.
         frames: All frames and their transforms.
         pictures: The sources of pictures.
+        actions: The goals that pages have sent.
     """
 
     def __init__(self, node: Node, permission: Permission) -> None:
@@ -82,6 +84,7 @@ class System:
         self.frames: Shared[Frames] = Shared(lambda: Frames(node))
         self.launches: Shared[Launches] = Shared(lambda: Launches(node, permission))
         self.pictures = Pictures()
+        self.actions: Actions = node.keep(Actions(node, permission))
         self.console: Shared[LogBook] = Shared(lambda: LogBook(node))
         self.parameters: Shared[Parameters] = Shared(lambda: Parameters(node, permission))
 

@@ -62,6 +62,7 @@ ENTRIES = (
     Entry("/parameters", "Parameters", "tune"),
     Entry("/reconfigure", "Reconfigure", "settings_input_component"),
     Entry("/services", "Services", "build"),
+    Entry("/actions", "Actions", "flag"),
     Entry("/drive", "Drive", "sports_esports"),
 )
 """The pages, in the order of the navigation."""
@@ -211,10 +212,15 @@ class Frame:
 
     def keep(self, part: Closable) -> None:
         """Close something with the page."""
-        if self._client.is_deleted:
+        if self.closed:
             part.close()
         else:
             self._uses.append(part)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the browser has left the page."""
+        return self._client.is_deleted
 
     def _close(self) -> None:
         uses, self._uses = self._uses, []

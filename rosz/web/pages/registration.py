@@ -7,6 +7,7 @@ from nicegui import app, ui
 
 from rosz.errors import RoszError
 from rosz.web.model import System
+from rosz.web.pages.actions import show_actions
 from rosz.web.pages.console import show_console
 from rosz.web.pages.drive import show_drive
 from rosz.web.pages.graph import show_graph
@@ -86,6 +87,10 @@ def _add_pages_of_nodes(system: System) -> None:
     @ui.page("/services")
     def services(service: str = "") -> None:
         show_services(system, service)
+
+    @ui.page("/actions")
+    def actions(action: str = "") -> None:
+        show_actions(system, action)
 
 
 def _add_pictures(system: System) -> None:

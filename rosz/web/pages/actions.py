@@ -1,0 +1,271 @@
+"""All actions, a form that sends a goal, and the goals with their feedback."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from rosz.web.model import ActionRow, Actions, ActionUse, GoalRow, SentGoal, System
+from rosz.web.pages.form import MessageForm
+from rosz.web.pages.layout import Frame, address_of, empty_state
+
+__all__ = ("show_actions",)
+
+_LIST_PERIOD = 1.0
+_PERIOD = 0.25
+_MOST_SHOWN = 10
+_COLORS = {"succeeded": "positive", "aborted": "negative", "rejected": "negative",
+           "lost": "negative", "canceled": "warning", "preempted": "warning",
+           "recalled": "warning"}  # fmt: skip
+
+
+def show_actions(system: System, action: str) -> None:
+    """Build the page.
+
+    Args:
+        system: The system.
+        action: Action to use; empty for none.
+    """
+    _ActionsPage(system, action)
+
+
+class _ActionsPage:
+    """The list of actions, the form, and the goals."""
+
+    def __init__(self, system: System, action: str) -> None:
+        self._system = system
+        self._actions: Actions = system.actions
+        self._frame = frame = Frame(system, "Actions", "/actions")
+        self._graph = frame.use(system.graph)
+        self._rows: dict[str, ActionRow] = {}
+        self._wanted = action
+        self._chosen = ""
+        self._use: ActionUse | None = None
+        self._cards: dict[SentGoal, _GoalCard] = {}
+        with frame.content:
+            self._empty = empty_state(
+                "flag",
+                "No action",
+                "Nodes that serve actions appear here; a small one is in:",
+                "rosz help actions",
+            )
+            with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
+                with ui.column().classes("gap-4 min-w-0"):
+                    self._table = self._add_table()
+                    self._others = _OtherGoals(self._cancel)
+                with ui.column().classes("gap-4 min-w-0"):
+                    self._add_form()
+                    self._goals = ui.column().classes("w-full gap-3")
+        frame.keep(self)
+        frame.every(_LIST_PERIOD, self._list)
+        frame.every(_PERIOD, self._refresh)
+
+    def close(self) -> None:
+        """End the use of the action; goals go on."""
+        use, self._use = self._use, None
+        if use is not None:
+            use.close()
+
+    def _add_table(self) -> ui.table:
+        names = {"name": "Action", "type": "Type", "servers": "Node"}
+        classes = {"type": "rosz-soft", "servers": "rosz-wide"}
+        columns: list[dict[str, Any]] = [
+            {
+                "name": name,
+                "label": label,
+                "field": name,
+                "align": "left",
+                "sortable": True,
+                "classes": classes.get(name, ""),
+                "headerClasses": "rosz-wide" if name == "servers" else "",
+            }
+            for name, label in names.items()
+        ]
+        with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full"):
+            ui.label("Actions").classes("text-base font-semibold")
+            table = (
+                ui.table(rows=[], columns=columns, row_key="name", pagination=12)
+                .classes("w-full cursor-pointer")
+                .props("flat dense")
+            )
+            table.on(
+                "row-click",
+                lambda event: self._choose(event.args["name"]),
+                js_handler="(event, row) => emit({name: row.name})",
+            )
+        return table
+
+    def _add_form(self) -> None:
+        with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full"):
+            self._name = ui.label("Choose an action.").classes("text-base font-semibold break-all")
+            self._type = ui.label("").classes("rosz-soft")
+            self._form = MessageForm(
+                self._system.node, "Goal in YAML; fields left out have their default value"
+            )
+            with ui.row().classes("w-full items-center gap-3"):
+                self._send_button = ui.button("Send goal", icon="send", on_click=self._send)
+                self._send_button.props("no-caps").disable()
+                self._cancel_button = ui.button(
+                    "Cancel all", icon="cancel", on_click=lambda: self._cancel("")
+                )
+                self._cancel_button.props("no-caps outline").disable()
+                with self._cancel_button:
+                    ui.tooltip("Ends the goals of all clients")
+
+    def _list(self) -> None:
+        found = self._actions.rows(self._graph.survey().view)
+        self._rows = {one.name: one for one in found}
+        rows = [
+            {"name": one.name, "type": one.type, "servers": ", ".join(one.servers)} for one in found
+        ]
+        if self._table.rows != rows:
+            self._table.rows = rows
+        if self._wanted in self._rows:
+            wanted, self._wanted = self._wanted, ""
+            ui.timer(0, lambda: self._choose(wanted), once=True)
+        elif self._wanted and self._graph.complete:
+            self._type.set_text(f"Waiting for a server of '{self._wanted}'.")
+        self._empty.set_visibility(not rows and self._graph.complete)
+
+    async def _choose(self, name: str) -> None:
+        self.close()
+        row = self._rows.get(name)
+        self._chosen = name
+        self._name.set_text(name)
+        self._type.set_text(f"{row.type} · {row.protocol}" if row else "")
+        self._form.clear()
+        for button in (self._send_button, self._cancel_button):
+            button.disable()
+        address_of(f"/actions?{urlencode({'action': name}, safe='/')}")
+        view = self._graph.survey().view
+        use = await self._frame.attempt(lambda: self._actions.use(view, name))
+        if use is None:
+            return
+        if self._chosen != name or self._frame.closed:
+            use.close()
+            return
+        self._use = use
+        self._form.show(use.value.goal_type)
+        for button in (self._send_button, self._cancel_button):
+            button.enable()
+
+    async def _send(self) -> None:
+        name, text, view = self._chosen, self._form.text, self._graph.survey().view
+        self._send_button.disable()
+        await self._frame.attempt(lambda: self._actions.send(view, name, text))
+        self._send_button.enable()
+        self._refresh()
+
+    async def _cancel(self, goal_id: str) -> None:
+        name, view = self._chosen, self._graph.survey().view
+        said = await self._frame.attempt(lambda: self._actions.cancel(view, name, goal_id))
+        if said is not None:
+            ui.notify(said, type="info")
+
+    def _refresh(self) -> None:
+        goals = self._actions.goals(self._chosen)[:_MOST_SHOWN] if self._chosen else []
+        for gone in set(self._cards) - set(goals):
+            self._cards.pop(gone).delete()
+        for goal in reversed(goals):
+            if goal not in self._cards:
+                with self._goals:
+                    self._cards[goal] = _GoalCard(goal, self._cancel)
+            self._cards[goal].refresh()
+        own = {one.id for one in goals}
+        rows = self._use.value.rows() if self._use is not None else []
+        self._others.show([one for one in rows if one.id not in own])
+
+
+class _GoalCard:
+    """One goal that a page has sent."""
+
+    def __init__(self, goal: SentGoal, cancel: Any) -> None:
+        self._goal = goal
+        self._seen = -1
+        self._ended = False
+        self._card = ui.column().classes("rosz-card w-full p-4 gap-2 min-w-0")
+        self._card.move(target_index=0)
+        with self._card:
+            with ui.row().classes("w-full items-center gap-3 no-wrap"):
+                self._state = ui.badge(goal.state, color="info").classes("text-sm")
+                self._time = ui.label("").classes("rosz-soft rosz-number text-sm")
+                ui.space()
+                self._cancel = ui.button("Cancel", on_click=lambda: cancel(goal.id)).props(
+                    "no-caps flat dense"
+                )
+            ui.label(f"{time.strftime('%H:%M:%S', time.localtime(goal.began))}  {goal.id}").classes(
+                "rosz-mono rosz-soft break-all"
+            )
+            self._result = ui.label("").classes("rosz-mono whitespace-pre-wrap break-all w-full")
+            self._fault = ui.label("").classes("text-negative break-words w-full")
+            self._count = ui.label("").classes("text-sm font-medium")
+            self._feedback = ui.label("").classes(
+                "rosz-mono whitespace-pre-wrap break-all w-full overflow-auto max-h-40"
+            )
+            with ui.expansion("Earlier feedback").props("dense").classes("w-full") as self._more:
+                self._earlier = ui.label("").classes(
+                    "rosz-mono whitespace-pre-wrap break-all w-full overflow-auto max-h-60"
+                )
+
+    def delete(self) -> None:
+        """Remove it from the page."""
+        self._card.delete()
+
+    def refresh(self) -> None:
+        """Show what has changed."""
+        goal = self._goal
+        if self._ended and self._seen == goal.feedbacks:
+            return
+        self._ended = goal.done
+        self._state.set_text(goal.state)
+        self._state.props(f"color={_COLORS.get(goal.state, 'info')}")
+        self._time.set_text(f"{goal.seconds:.1f} s")
+        self._cancel.set_visibility(not goal.done)
+        for label, text in ((self._result, goal.result), (self._fault, goal.fault)):
+            label.set_text(text)
+            label.set_visibility(bool(text))
+        if self._seen != goal.feedbacks:
+            self._seen = goal.feedbacks
+            texts = goal.feedback()
+            self._count.set_text(f"Feedback {goal.feedbacks}")
+            self._feedback.set_text(texts[0][1] if texts else "")
+            self._earlier.set_text("\n".join(f"{number}\n{text}" for number, text in texts[1:]))
+        for part in (self._count, self._feedback):
+            part.set_visibility(self._seen > 0)
+        self._more.set_visibility(self._seen > 1)
+
+
+class _OtherGoals:
+    """The goals of others, as the server publishes them."""
+
+    def __init__(self, cancel: Any) -> None:
+        self._cancel = cancel
+        self._shown: list[GoalRow] = []
+        with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full") as self._card:
+            ui.label("Other goals of the server").classes("text-base font-semibold")
+            self._rows = ui.column().classes("w-full gap-1")
+        self._card.set_visibility(False)
+
+    def show(self, rows: list[GoalRow]) -> None:
+        """Show goals, the newest first."""
+        rows = rows[:_MOST_SHOWN]
+        if rows == self._shown:
+            return
+        self._shown = rows
+        self._card.set_visibility(bool(rows))
+        self._rows.clear()
+        with self._rows:
+            for row in rows:
+                self._add(row)
+
+    def _add(self, row: GoalRow) -> None:
+        with ui.row().classes("w-full items-center gap-3 no-wrap"):
+            ui.badge(row.state, color=_COLORS.get(row.state, "info"))
+            ui.label(row.id).classes("rosz-mono rosz-soft break-all grow")
+            if row.running:
+                ui.button("Cancel", on_click=lambda: self._cancel(row.id)).props(
+                    "no-caps flat dense"
+                )
