@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.node.action_client import ClientGoal
 
-__all__ = ("ActionRow", "ActionUse", "Actions", "GoalRow", "SentGoal")
+__all__ = ("ActionRow", "ActionUse", "Actions", "GoalRow", "Port", "SentGoal")
 
 _MOST_GOALS = 30
 _MOST_FEEDBACK = 20
