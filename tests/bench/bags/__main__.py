@@ -1,6 +1,7 @@
 """How fast ``rosz bag record`` records, beside Debian's rosbag and the library ``mcap``.
 
 Each line is one run: what was published, what is in the bag, CPU time and memory of the recorder.
+With ``--real-time``, all run before the other programs of the machine, which takes root.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from mcap.writer import CompressionType, Writer
 
 from rosz.bags import Channel, McapWriter, open_reader
 
+from .conditions import prepare  # tests is no package
+
 HERE = Path(__file__).parent
 IMAGE = 1 << 20
 RUNS = (
@@ -38,11 +41,12 @@ def cpu_seconds(pid: int) -> float:
     return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
 
 
-def peak_memory(pid: int) -> float:
+def memory(pid: int, kind: str) -> int:
+    """Return megabytes of memory of a kind that ``/proc/PID/status`` has."""
     for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith("VmHWM"):
-            return int(line.split()[1]) / 1024
-    return 0.0
+        if line.startswith(kind):
+            return round(int(line.split()[1]) / 1024)
+    return 0
 
 
 def run(system: str, size: int, rate: int, count: int, folder: Path) -> dict[str, Any]:
@@ -85,9 +89,10 @@ def run(system: str, size: int, rate: int, count: int, folder: Path) -> dict[str
         record = [python, "-m", "rosz", "bag", "record"] if ours else ["/usr/lib/rosbag/record"]
         recorder = start(*record, "/bench", "-O", str(bag))
         talker.stdout.readline()
-        before = cpu_seconds(recorder.pid)
+        before, idle = cpu_seconds(recorder.pid), memory(recorder.pid, "VmRSS")
         kept = json.loads(talker.stdout.readline())["rate"]
-        used, memory = cpu_seconds(recorder.pid) - before, peak_memory(recorder.pid)
+        used, peak = cpu_seconds(recorder.pid) - before, memory(recorder.pid, "VmHWM")
+        own = memory(recorder.pid, "RssAnon")
         recorder.send_signal(signal.SIGINT)
         recorder.wait(60)
         with open_reader(bag) as reader:
@@ -106,7 +111,8 @@ def run(system: str, size: int, rate: int, count: int, folder: Path) -> dict[str
         "lost": count - found,
         "CPU ms/MB": round(used * 1000 / megabytes, 2),
         "CPU us/message": round(used * 1e6 / count, 1),
-        "memory MB": round(memory),
+        "memory MB before, at most, of its own": (idle, peak, own),
+        "load": round(os.getloadavg()[0], 1),
     }
 
 
@@ -136,6 +142,7 @@ def write_alone(folder: Path) -> dict[str, float]:
 
 
 def main() -> None:
+    prepare()
     folder = Path(tempfile.mkdtemp(prefix="rosz-bench-"))
     try:
         print(json.dumps({"1 MB messages written per second": write_alone(folder)}))
