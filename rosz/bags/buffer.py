@@ -1,4 +1,4 @@
-"""A queue of messages that wait to be written, bounded by their size in bytes."""
+"""Bounds, in bytes, of the messages that wait to be written."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-__all__ = ("ROW_BYTES", "Buffer")
+__all__ = ("ROW_BYTES", "Buffer", "Channels")
 
 T = TypeVar("T")
 
@@ -16,6 +16,10 @@ ROW_BYTES = 400
 _COLLECT_SECONDS = 0.01
 """Time to wait for more after the first item, as waking a thread for each takes longer than
 writing it."""
+_SMALL_CHANNEL = 4 << 20
+"""Bytes that may wait in the channel of a topic with small messages; they are not counted."""
+_LEAST = 8
+"""Messages of a topic that may wait in its channel however large they are."""
 
 
 class Buffer(Generic[T]):
@@ -80,3 +84,49 @@ class Buffer(Generic[T]):
         self._ended.set()
         with self._changed:
             self._changed.notify_all()
+
+
+class Channels:
+    """How many messages may wait in Zenoh's channel of each topic.
+
+    Topics with large messages share a number of bytes. Sizes and numbers are rounded to powers of
+    two, so that they change rarely.
+
+    Args:
+        limit: The bytes that they share.
+        depth: Largest number of messages in a channel.
+
+    Attributes:
+        size: Bytes that may wait in the channels of topics with large messages.
+    """
+
+    def __init__(self, limit: int, depth: int) -> None:
+        self._limit = limit
+        self._depth = depth
+        self._lock = threading.Lock()
+        self._largest: dict[str, int] = {}
+        self._share = limit
+        self.size: int = 0
+
+    def fit(self, topic: str, size: int) -> int:
+        """Return how many messages may wait in the channel of a topic.
+
+        Args:
+            topic: The topic.
+            size: Bytes of one of its messages.
+        """
+        largest = self._largest.get(topic, 0)
+        if size > largest:
+            with self._lock:
+                largest = self._largest[topic] = 1 << (size - 1).bit_length()
+                large = [one for one in self._largest.values() if self._is_large(one)]
+                self._share = self._limit // max(len(large), 1)
+                self.size = sum(one * self._fitting(one) for one in large)
+        return self._fitting(largest) if self._is_large(largest) else self._depth
+
+    def _is_large(self, size: int) -> bool:
+        return size * self._depth > _SMALL_CHANNEL
+
+    def _fitting(self, size: int) -> int:
+        count = self._share // size
+        return min(max(1 << count.bit_length() >> 1, _LEAST), self._depth)

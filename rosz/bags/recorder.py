@@ -6,7 +6,8 @@ node. The messages of the channel wait in memory until that has replied, and for
 until the token of the publisher is known.
 
 Messages are taken from Zenoh at once, whatever the disk does, and wait in one buffer that is
-bounded by bytes. One thread writes them from there.
+bounded by bytes. One thread writes them from there. While the processor is too busy to take them,
+they wait in Zenoh's channels. Topics with large messages share half of the bound for these.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Self
 
 from rosz.bags.bag import Channel, Payload
-from rosz.bags.buffer import ROW_BYTES, Buffer
+from rosz.bags.buffer import ROW_BYTES, Buffer, Channels
 from rosz.bags.recording import Selection, Sink, Track
 from rosz.errors import BagError, ClosedError, MessageError, RoszError
 from rosz.node import Subscription
@@ -34,8 +35,7 @@ if TYPE_CHECKING:
 __all__ = ("Recorder",)
 
 _QOS = QoS(depth=8192)
-"""Samples of a topic that wait until they are taken from Zenoh, which takes no time but that of a
-busy processor."""
+"""Samples of a topic that wait until they are taken from Zenoh."""
 _TOKEN_TIMEOUT = 1.0
 """Time that messages wait for the token of their publisher, which tells its QoS and its node."""
 _DEFINITION_TIMEOUT = 10.0
@@ -112,8 +112,9 @@ class Recorder:
         self._counting = threading.Lock()
         self._most = buffer
         self._held_bytes = 0
+        self._channels = Channels(buffer // 2, _QOS.depth)
         self._buffer: Buffer[tuple[_Source, _Row]] = Buffer(
-            buffer, lambda: sink.waiting + self._held_bytes
+            buffer, lambda: sink.waiting + self._held_bytes + self._channels.size
         )
         self._subscribed: dict[str, Subscription[bytes]] = {}
         self._publishers: dict[str, Followed] = {}
@@ -160,6 +161,7 @@ class Recorder:
                     raw=True,
                     with_info=True,
                     warn_dropped=False,
+                    fit=partial(self._channels.fit, topic) if self._most else None,
                 )
                 self._subscribed[topic] = self._node.keep(subscription)
             except ClosedError:

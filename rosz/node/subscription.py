@@ -72,6 +72,8 @@ class Subscription(Entity, Generic[M]):
         raw: Whether to pass on the encoded bytes instead of messages.
         with_info: Whether the callback also gets a `MessageInfo`.
         warn_dropped: Whether the first sample that is dropped is logged.
+        fit: Function that returns how many samples of a size in bytes may wait for the callback,
+            where these are fewer than the depth; only without a message type.
 
     Attributes:
         message_type: As given.
@@ -90,6 +92,7 @@ class Subscription(Entity, Generic[M]):
         raw: bool = False,
         with_info: bool = False,
         warn_dropped: bool = True,
+        fit: Callable[[int], int] | None = None,
     ) -> None:
         name, type_hash = ANY, ANY
         if message_type is not None:
@@ -102,6 +105,7 @@ class Subscription(Entity, Generic[M]):
         self._raw = raw
         self._with_info = with_info
         self._warn_dropped = warn_dropped
+        self._fit = fit
         self._depth = _ALL if qos.history == "keep_all" else min(qos.depth, _MOST)
         self._queue = _Queue(self._depth)
         self._queue_worker: Worker[_Item] | None = None
@@ -146,7 +150,10 @@ class Subscription(Entity, Generic[M]):
         if self._callback is None:
             self.keep(session.subscriber(self.key, self._receive, history=history, recover=recover))
             return
-        ring = session.pull_subscriber(self.key, self._depth, history=history, recover=recover)
+        if self._fit is None:
+            ring = session.pull_subscriber(self.key, self._depth, history=history, recover=recover)
+        else:
+            ring = session.bounded_subscriber(self.key, self._depth, self._fit)
         self.keep(ring)
         Worker(f"rosz-sub{self.name}", self._dispatch, receive=partial(_next_sample, ring))
 

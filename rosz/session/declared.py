@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -17,6 +18,7 @@ from rosz.session.samples import Sample
 from rosz.worker import Worker
 
 __all__ = (
+    "BoundedSubscriber",
     "CallbackThread",
     "Declared",
     "PullSubscriber",
@@ -208,6 +210,67 @@ class PullSubscriber(Declared):
             while not ENDING.is_set() and (raw := self._try_recv()) is not None:
                 samples.append(Sample(raw))
         return samples
+
+
+class BoundedSubscriber(PullSubscriber):
+    """A subscriber whose number of samples that wait falls with their size.
+
+    The channels of Zenoh have a fixed number of places. Where that has to fall, a subscriber with
+    a smaller channel takes the place of the one before. What waits there is received first, and
+    what both have got is received once.
+
+    Args:
+        key: The key expression.
+        declare: Function that declares a subscriber that keeps so many samples.
+        depth: The number of samples to keep at first.
+        fit: Function that returns how many samples of a size in bytes may wait.
+    """
+
+    def __init__(
+        self, key: str, declare: Callable[[int], Any], depth: int, fit: Callable[[int], int]
+    ) -> None:
+        super().__init__(key, declare(depth))
+        self._declare = declare
+        self._depth = depth
+        self._fit = fit
+        self._waiting: deque[Sample] = deque()
+        self._repeated: set[bytes | None] = set()
+        self._doubtful = 0  # how many samples may still be repeated ones
+
+    def receive(self) -> Sample:
+        """Wait for a sample and return the oldest one.
+
+        Raises:
+            ClosedError: The subscriber or the session was closed.
+        """
+        while True:
+            if self._waiting:
+                return self._waiting.popleft()
+            sample = super().receive()
+            if self._doubtful:
+                self._doubtful -= 1
+                if sample.attachment in self._repeated:
+                    continue
+            depth = self._fit(sample.size)
+            if depth < self._depth:
+                self._replace(depth)
+            return sample
+
+    def _replace(self, depth: int) -> None:
+        """Receive by a new subscriber that keeps fewer samples."""
+        with self._call(f"subscribe to '{self._key}'"):
+            self._depth = depth
+            self._entities.append(self._declare(depth))
+            before = self._repeated if self._doubtful else set()
+            waiting = [one for one in self.take() if one.attachment not in before]
+            self._repeated = before | {one.attachment for one in waiting} - {None}
+            self._doubtful = depth + len(self._repeated)
+            self._waiting = deque(waiting, depth)
+            old, new = self._entities
+            self._recv, self._try_recv = new.handler.recv, new.handler.try_recv
+            del self._entities[0]
+            old.undeclare()
+            del old, new
 
 
 class RawPublisher(Declared):

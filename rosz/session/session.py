@@ -22,6 +22,7 @@ from rosz.session.at_exit import ENDING, ClosedSession
 from rosz.session.channels import declare, declare_rare, open_channel
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
+    BoundedSubscriber,
     CallbackThread,
     Declared,
     PullSubscriber,
@@ -270,6 +271,22 @@ class Session:
         """
         handler: Any = zenoh.handlers.RingChannel(depth)
         return PullSubscriber(key, self._subscribe(key, handler, history, recover, remote_only))
+
+    def bounded_subscriber(self, key: str, depth: int, fit: Callable[[int], int]) -> PullSubscriber:
+        """Declare a subscriber that keeps fewer samples if they are large.
+
+        Args:
+            key: The key expression to subscribe to.
+            depth: The largest number of samples to keep; a new one replaces the oldest.
+            fit: Function that returns how many samples of a size in bytes may wait. It is called
+                with each sample; the number that it returns should rarely fall.
+        """
+
+        def declare(count: int) -> Any:
+            handler: Any = zenoh.handlers.RingChannel(count)
+            return self._subscribe(key, handler, history=0, recover=False, remote_only=False)
+
+        return BoundedSubscriber(key, declare, depth, fit)
 
     def _subscribe(
         self, key: str, handler: Any, history: int, recover: bool, remote_only: bool

@@ -449,6 +449,38 @@ def test_what_waits_for_the_disk_is_bounded(
     assert len(found) + made.recorder.lost == 40
 
 
+def test_what_waits_for_the_processor_is_bounded(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Zenoh keeps no more of large messages than fit into half of --buffsize."""
+    held, free, receive = threading.Event(), threading.Event(), Recorder._receive
+
+    def wait_and_receive(recorder: Recorder, topic: str, *given: Any) -> None:
+        if topic == "/big" and given[1].sequence > 1:
+            held.set()
+            assert free.wait(TIMEOUT)
+        receive(recorder, topic, *given)
+
+    monkeypatch.setattr(Recorder, "_receive", wait_and_receive)
+    node = network.node("talker")
+    big = node.publisher("/big", String, qos=QoS(history="keep_all"))
+    last = node.publisher("/last", String, qos=QoS(history="keep_all"))
+    with recording(network, "x", "/big", "/last", buffer=32 << 20) as made:
+        connect(big)
+        connect(last)
+        for number in range(40):
+            big.publish(String(data=f"{number:06}" + " " * (1 << 20)))
+            if number == 1:
+                assert held.wait(TIMEOUT)
+        last.publish(String(data="behind all others"))
+        eventually(lambda: made.count_of("/last") == 1)
+        free.set()
+        eventually(lambda: made.count_of("/big") + made.recorder.lost == 40)
+    with open_reader(network.folder / "x.mcap") as reader:
+        found = [int(bytes(one.data[8:14])) for one in reader.messages({"/big"})]
+    assert found == [0, 1, *range(32, 40)]
+
+
 def test_snapshots_are_of_the_last_seconds(network: Network) -> None:
     talker = network.node("talker")
     talker.params.set("/rate", 5)
