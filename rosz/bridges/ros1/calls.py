@@ -60,12 +60,14 @@ class Call(msgspec.Struct, frozen=True):
         method: Name of the method.
         args: Arguments.
         keep_alive: Whether the caller keeps the connection for further calls.
+        size: Size of its document in bytes.
     """
 
     path: str
     method: str
     args: tuple[Any, ...]
     keep_alive: bool = True
+    size: int = 0
 
 
 class CallReader:
@@ -79,6 +81,11 @@ class CallReader:
     def is_idle(self) -> bool:
         """Whether nothing of the next call has been received."""
         return self._head is None and not self._data
+
+    @property
+    def size(self) -> int:
+        """Number of bytes that have been received of the next call."""
+        return len(self._data)
 
     def feed(self, data: bytes | memoryview) -> Iterator[Call]:
         """Yield the calls that are complete with more bytes of the stream.
@@ -105,7 +112,7 @@ class CallReader:
             args, method = _loads(body, _CALL)
             if method is None:
                 raise DecodeError(_CALL, -1, "no methodName")
-            yield Call(path, method, args, keep_alive)
+            yield Call(path, method, args, keep_alive, size)
 
 
 def _read_head(head: bytes) -> tuple[str, int, bool]:

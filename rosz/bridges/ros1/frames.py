@@ -126,6 +126,11 @@ class FrameReader:
         """Number of bytes that have been received of the next frame, its length included."""
         return self._end - self._begin
 
+    @property
+    def size(self) -> int:
+        """Number of bytes that its storage takes."""
+        return len(self._storage)
+
     def _make_space(self) -> None:
         """Move what is left to the beginning of a storage with space."""
         left = self._end - self._begin

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import selectors
 import socket
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -38,6 +39,8 @@ _TIMEOUT = 30.0
 _PAUSE = 1.0
 _MAX_REPORTED = 1000
 _PIECE = 1 << 16
+_MAX_HELD = 256 << 20
+"""Bytes of calls and headers that have not been answered yet, of all connections together."""
 
 
 class Server:
@@ -64,6 +67,8 @@ class Server:
         self.calls: Worker[Callable[[], object]] = Worker(
             "rosz-ros1-calls", threads=_THREADS, capacity=_MAX_CALLS, logger=log
         )
+        self._held = 0
+        self._holding = threading.Lock()
         self._streams: set[Stream] = set()
         self._reported: set[str] = set()
         try:
@@ -98,6 +103,19 @@ class Server:
         if text not in self._reported and len(self._reported) < _MAX_REPORTED:
             self._reported.add(text)
             log.warning("%.500s (told once)", text)
+
+    def hold(self, count: int) -> None:
+        """Count bytes of requests that are held from now on, or, if negative, no more.
+
+        Raises:
+            TransportError: These would be too many.
+        """
+        with self._holding:
+            if count > 0 and self._held + count > _MAX_HELD:
+                raise TransportError(
+                    f"the requests of all connections take more than {_MAX_HELD >> 20} MB"
+                )
+            self._held += count
 
     def forget(self, stream: Stream) -> None:
         """Remove a stream that has ended."""
@@ -138,25 +156,27 @@ class Incoming:
         sock: The socket.
 
     Attributes:
+        server: As given.
         stream: The stream.
     """
 
     def __init__(self, server: Server, sock: socket.socket) -> None:
-        self._server = server
+        self.server = server
+        self._held = 0
         self._first = b""
         self._calls: CallReader | None = None
         self._frames: FrameReader | None = None
         self._greeted = False
-        self.stream = Stream(server.loop, sock, self, server.forget)
+        self.stream = Stream(server.loop, sock, self, self._ended)
         self._check_later()
 
     def space(self) -> memoryview:
         """Return where the next bytes belong."""
-        return memoryview(self._server.piece)
+        return memoryview(self.server.piece)
 
     def received(self, count: int) -> None:
         """Read calls, or the header."""
-        data = memoryview(self._server.piece)[:count]
+        data = memoryview(self.server.piece)[:count]
         if self._calls is None and self._frames is None:
             self._first += data
             if len(self._first) < len(_POST):
@@ -175,16 +195,35 @@ class Incoming:
     def closed(self) -> None:
         """Do nothing: the server forgets the stream."""
 
+    def hold(self, count: int) -> None:
+        """Note how many bytes of a request that is not complete the connection holds.
+
+        Raises:
+            TransportError: All connections together hold too many.
+        """
+        before, self._held = self._held, 0
+        self.server.hold(-before)
+        self.server.hold(count)
+        self._held = count
+
+    def _ended(self, stream: Stream) -> None:
+        self.server.forget(stream)
+        self.hold(0)
+
     def refuse(self, text: str) -> None:
         """Close the stream after an error in words, which is logged once; any thread may."""
-        self._server.report(f"refused a connection of {self.stream.host}: {text}")
+        self.server.report(f"refused a connection of {self.stream.host}: {text}")
         self.stream.end()
 
     def _feed_calls(self, reader: CallReader, data: memoryview) -> None:
         try:
             for call in reader.feed(data):
-                if not self._server.calls.offer(partial(self._answer, call)):
+                self.hold(0)
+                self.server.hold(call.size)
+                if not self.server.calls.offer(partial(self._answer, call)):
+                    self.server.hold(-call.size)
                     self.stream.send([encode_fault("the master is busy: try again")])
+            self.hold(reader.size)
         except DecodeError as error:
             self.stream.send([encode_refusal(str(error))])
             raise
@@ -192,10 +231,12 @@ class Incoming:
     def _answer(self, call: Call) -> None:
         try:
             data = encode_result(
-                self._server.dispatch(call, self.stream), keep_alive=call.keep_alive
+                self.server.dispatch(call, self.stream), keep_alive=call.keep_alive
             )
         except RoszError as error:
             data = encode_fault(str(error), keep_alive=call.keep_alive)
+        finally:
+            self.server.hold(-call.size)
         self.stream.send([data])
         if not call.keep_alive:
             self.stream.end()
@@ -211,8 +252,10 @@ class Incoming:
                 header = decode_header(frame)
                 # The other end sends nothing until it is answered.
                 self.stream.pause(reading=False)
-                self._server.connect(self, header)
+                self.hold(0)
+                self.server.connect(self, header)
                 return
+            self.hold(reader.pending)
 
     def _check_later(self) -> None:
         """Look at the progress in a while; the timer does not keep what has ended."""
@@ -223,7 +266,7 @@ class Incoming:
             if found is not None:
                 found()
 
-        self._server.loop.later(_TIMEOUT, run)
+        self.server.loop.later(_TIMEOUT, run)
 
     def _check_progress(self) -> None:
         """Close a connection that has begun something and does not come to its end."""

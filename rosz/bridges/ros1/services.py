@@ -35,6 +35,9 @@ _FAILED = b"\0"
 _REFUSED = "service cannot process request: "
 """What rospy writes before the text of an error, and rosz, too."""
 
+_KEPT = 1 << 20
+"""Bytes that a connection keeps for its next request."""
+
 _THREADS = 16
 _RETRY = 1.0
 _MOST_RETRIES = 5
@@ -230,6 +233,7 @@ class ServiceConnection:
         submit: Callable[[Callable[[], object]], bool],
     ) -> None:
         self._shared = shared
+        self._incoming = incoming
         self._stream = incoming.stream
         self._client = client
         self._persistent = persistent
@@ -261,8 +265,14 @@ class ServiceConnection:
         """Call the service with each request that is complete."""
         for request in self._reader.take(count):
             data = bytes(request)
+            self._incoming.hold(0)
+            self._incoming.server.hold(len(data))
             if not self._submit(partial(self._call, data)):
+                self._incoming.server.hold(-len(data))
                 self._answer(_FAILED, b"the bridge is busy")
+        self._incoming.hold(self._reader.pending)
+        if not self._reader.pending and self._reader.size > _KEPT:
+            self._reader = FrameReader(MAX_FRAME)
 
     def closed(self) -> None:
         """Do nothing: a call that is running goes on."""
@@ -283,6 +293,8 @@ class ServiceConnection:
                 f"service [{self._client.name}] responded with an error: "
             )
             ok, answer = _FAILED, text.encode()
+        finally:
+            self._incoming.server.hold(-len(data))
         self._answer(ok, answer)
 
     def _answer(self, ok: bytes, data: bytes) -> None:

@@ -22,7 +22,8 @@ __all__ = ("Handler", "SocketLoop", "Stream", "log")
 log = logging.getLogger("rosz.ros1")
 
 _MAX_QUEUED = 64 << 20
-"""Bytes that wait to be sent on one stream; of more, the oldest messages are dropped."""
+"""Bytes that wait to be sent on one stream; of more, the oldest messages are dropped. Where none
+may be dropped, the stream is closed."""
 
 _WAKE = b"\0"
 _KEEPALIVE = (("TCP_KEEPIDLE", 5), ("TCP_KEEPINTVL", 2), ("TCP_KEEPCNT", 3))
@@ -248,10 +249,10 @@ class Stream:
                 self._resume()
             if events & selectors.EVENT_READ and self._reading:
                 self._receive()
-        except OSError:
-            self.close()
         except RoszError as error:
             log.warning("closed the connection of %s: %.300s", self.peer, error)
+            self.close()
+        except OSError:
             self.close()
 
     def _receive(self) -> None:
@@ -311,6 +312,10 @@ class Stream:
     def _trim(self) -> None:
         """Drop the oldest messages of which nothing has been sent. Needs the lock."""
         if self.depth is None:
+            if self._queued > _MAX_QUEUED:
+                log.warning("closed the connection of %s: it does not read its answers", self.peer)
+                self._ending = True
+                self._loop.call(self.close)
             return
         first = int(self._begun)
         while len(self._queue) > self.depth + first or (

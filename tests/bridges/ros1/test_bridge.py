@@ -9,8 +9,9 @@ import socket
 import struct
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
+from http.client import HTTPException
 from queue import SimpleQueue
 from typing import Any
 from xmlrpc.client import ServerProxy, dumps
@@ -322,6 +323,62 @@ def test_a_slow_program_costs_one_line_and_nobody_waits(
     assert sorted(line for line in told if any(peer in line for peer in peers)) == sorted(
         f"closed the connection of {peer}: nothing complete in 1 s" for peer in peers
     )
+
+
+def test_half_a_request_of_many_takes_bounded_memory(
+    world: World, node: Node, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    piece, fit = 1 << 18, 5
+    refusal = "the requests of all connections take more than"
+    monkeypatch.setattr("rosz.bridges.ros1.server._MAX_HELD", (fit + 1) * piece - 1)
+    node.service("/half", SetBool, lambda _: [True, ""])
+    eventually(lambda: world.call("lookupService", "/x", "/half")[0] == 1)
+    call = f"POST / HTTP/1.1\r\nContent-Length: {2 * piece}\r\n\r\n".encode()
+    length = struct.pack("<I", 2 * piece)
+    service = encode_header({"service": "/half", "callerid": "/x", "md5sum": "*"})
+    for begin, answered in ((call, False), (length, False), (service, True)):
+        caplog.clear()
+        with ExitStack() as stack:
+            for _ in range(fit + 1):
+                sock = socket.create_connection(("127.0.0.1", world.port), TIMEOUT)
+                stack.enter_context(sock)
+                sock.sendall(begin)
+                if answered:
+                    assert sock.recv(4096)
+                    sock.sendall(length)
+                sock.sendall(bytes(piece))
+            eventually(lambda: refusal in caplog.text)
+            assert caplog.text.count(refusal) == 1
+        eventually(lambda: _takes(world, (fit - 1) * piece), "room after their end")
+    world.call("deleteParam", "/x", "/half")
+
+
+def _takes(world: World, size: int) -> bool:
+    """Return whether the master takes a call of a size in bytes."""
+    try:
+        return bool(world.call("setParam", "/x", "/half", "x" * size)[0] == 1)
+    except (OSError, HTTPException):
+        return False
+
+
+def test_a_program_that_reads_no_answers_is_closed(
+    world: World, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosz.bridges.ros1.sockets._MAX_QUEUED", 1 << 20)
+    world.call("setParam", "/x", "/large", "x" * (1 << 20))
+    request = _post(dumps(("/x", "/large"), "getParam"))
+    with socket.create_connection(("127.0.0.1", world.port), TIMEOUT) as sock:
+        peer = f"127.0.0.1:{sock.getsockname()[1]}"
+        line = f"closed the connection of {peer}: it does not read its answers"
+
+        def is_closed() -> bool:
+            with suppress(OSError):
+                sock.sendall(request)
+            return line in [record.getMessage() for record in caplog.records]
+
+        eventually(is_closed, "its end", 4 * TIMEOUT)
+    world.call("deleteParam", "/x", "/large")
+    assert sum(peer in record.getMessage() for record in caplog.records) == 1
 
 
 def test_a_port_that_is_taken_is_named(world: World) -> None:
