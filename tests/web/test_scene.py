@@ -28,7 +28,8 @@ from rosz.msgs.sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY, Pose, StaticTransformBroadcaster, TransformBroadcaster
 from rosz.web.model import Frames, Permission, System
-from rosz.web.scene import Look, Setup, TopicDisplay, format_setup, read_setup
+from rosz.web.scene import Look, Setup, format_setup, read_setup
+from rosz.web.scene.display import TopicDisplay
 from rosz.web.scene.drawing import Drawing
 from rosz.web.scene.poses import draw_map, draw_path, draw_poses
 from rosz.web.scene.sensors import draw_cloud, draw_scan

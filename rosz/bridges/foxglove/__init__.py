@@ -7,7 +7,7 @@ publishers, subscriptions and outgoing queues are those of the rosbridge protoco
 
 from __future__ import annotations
 
-from rosz.bridges.foxglove.assets import SHOWN
+from rosz.bridges.assets import SHOWN
 from rosz.bridges.foxglove.connection import CAPABILITIES
 from rosz.bridges.foxglove.opening import Settings, open_bridge
 from rosz.bridges.foxglove.server import PORT, FoxgloveBridge, Limits, Offer

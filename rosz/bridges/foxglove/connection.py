@@ -17,7 +17,7 @@ from rosz.bridges.websocket import Feed, Message, Outbox, build
 from rosz.errors import RoszError, TypeNotFound, UsageError
 
 if TYPE_CHECKING:
-    from rosz.bridges.foxglove.assets import Assets
+    from rosz.bridges.assets import Assets
     from rosz.bridges.foxglove.catalog import Catalog
     from rosz.bridges.foxglove.parameters import Parameters
     from rosz.bridges.foxglove.services import Services

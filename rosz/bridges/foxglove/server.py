@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self
 import msgspec
 
 from rosz.bridges.admission import Admission
-from rosz.bridges.foxglove.assets import SHOWN, Assets
+from rosz.bridges.assets import SHOWN, Assets
 from rosz.bridges.foxglove.catalog import Catalog
 from rosz.bridges.foxglove.connection import CAPABILITIES, Connection, Shared
 from rosz.bridges.foxglove.parameters import Parameters

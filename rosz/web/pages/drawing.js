@@ -165,7 +165,15 @@ export default class Drawing {
     map.colorSpace = THREE.SRGBColorSpace;
     map.needsUpdate = true;
     const geometry = new THREE.PlaneGeometry(1, 1).translate(0.5, 0.5, 0);
-    const settings = { map, transparent: true, side: THREE.DoubleSide, depthWrite: false };
+    const settings = {
+      map,
+      transparent: true,
+      side: THREE.DoubleSide,
+      depthWrite: false,
+      polygonOffset: true, // lines on the ground are above it
+      polygonOffsetFactor: 1,
+      polygonOffsetUnits: 4,
+    };
     const found = this.finish(new THREE.Mesh(geometry, new THREE.MeshBasicMaterial(settings)));
     found.renderOrder = -1;
     found.matrixAutoUpdate = false;

@@ -11,21 +11,16 @@ from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 
 from rosz.errors import RoszError
-from rosz.introspect.topics import list_topics
-from rosz.names import short_type
 from rosz.web.model import Frames, System
 from rosz.web.pages.layout import Frame, address_of
 from rosz.web.scene import (
-    DRAWN_TYPES,
-    GRID,
-    TF,
     Display,
-    FrameDisplay,
-    GridDisplay,
     Look,
+    Meshes,
     Setup,
-    TopicDisplay,
     format_setup,
+    list_displays,
+    open_display,
     read_setup,
 )
 
@@ -42,8 +37,22 @@ _CHOICES = {
     "sensor_msgs/PointCloud2": _CLOUDS,
 }
 """What colors can stand for, by type."""
-_OWN_COLORS = frozenset({"Frames", "nav_msgs/OccupancyGrid"})
-_OWN_SIZES = frozenset({"nav_msgs/OccupancyGrid", "sensor_msgs/Range"})
+_MARKERS = ("Robot", "visualization_msgs/Marker", "visualization_msgs/MarkerArray")
+_OWN_COLORS = frozenset({"Frames", "nav_msgs/OccupancyGrid", *_MARKERS})
+_OWN_SIZES = frozenset({"nav_msgs/OccupancyGrid", "sensor_msgs/Range", *_MARKERS})
+_NEED_COLOR = frozenset(
+    {
+        "geometry_msgs/PolygonStamped",
+        "geometry_msgs/PoseArray",
+        "geometry_msgs/PoseStamped",
+        "geometry_msgs/PoseWithCovarianceStamped",
+        "nav_msgs/Odometry",
+        "nav_msgs/Path",
+        "sensor_msgs/LaserScan",
+        "sensor_msgs/Range",
+    }
+)
+"""Types that get a color of their own when they are added."""
 _UNITS = dict.fromkeys(_CHOICES, "Pixels")
 _VIEWS = {"orbit": "From the side", "top": "From above"}
 
@@ -86,6 +95,8 @@ class _ScenePage:
         self._frames: Frames = frame.use(system.frames)
         self._setup = setup
         self._shown: list[_Shown] = []
+        self._keys: list[str] = []
+        self._meshes = Meshes(system.node.context.environment, self._publish)
         self._chosen = bool(setup.frame)
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
@@ -114,10 +125,8 @@ class _ScenePage:
             with ui.element("div").classes(
                 "w-full grid gap-4 grid-cols-1 lg:grid-cols-[minmax(0,1fr)_19rem]"
             ):
-                self._scene = (
-                    ui.scene(grid=False, background_color="#f4f6fa", fps=30)
-                    .classes("rosz-card w-full overflow-hidden rosz-scene")
-                    .style("height: calc(100vh - 190px); min-height: 320px")
+                self._scene = ui.scene(grid=False, background_color="#f4f6fa", fps=30).classes(
+                    "rosz-card w-full overflow-hidden rosz-scene"
                 )
                 self._list = ui.column().classes("w-full gap-2 min-w-0")
         frame.keep(self)
@@ -132,6 +141,13 @@ class _ScenePage:
         for shown in self._shown:
             shown.close()
         self._shown.clear()
+        for key in self._keys:
+            self._system.pictures.remove(key)
+
+    def _publish(self, source: Callable[[], tuple[bytes, str]]) -> str:
+        """Give the contents of a file an address until the page is closed."""
+        self._keys.append(self._system.pictures.add(source))
+        return f"/picture/{self._keys[-1]}"
 
     # Displays.
 
@@ -139,19 +155,6 @@ class _ScenePage:
         with self._list:
             shown = _Shown(self._system, self._scene, look, self._changed, self._remove)
         self._shown.append(shown)
-
-    def _open(self, look: Look) -> Display:
-        """Open a display.
-
-        Raises:
-            RoszError: It cannot be opened, or not yet.
-        """
-        if look.name == GRID:
-            return GridDisplay(look)
-        if look.name == TF:
-            return FrameDisplay(look, self._frames)
-        self._system.permission.check("subscribe", look.name)
-        return TopicDisplay(self._system.node, self._graph.survey(), look, self._frames)
 
     def _remove(self, shown: _Shown) -> None:
         self._shown.remove(shown)
@@ -164,19 +167,9 @@ class _ScenePage:
             return
         self._add.set_value(None)
         color = _COLORS[len(self._shown) % len(_COLORS)]
-        kind = self._found().get(name, "")
-        plain = name in {GRID, TF} or kind in {"sensor_msgs/PointCloud2", "nav_msgs/OccupancyGrid"}
-        self._show(Look(name, "" if plain else color))
+        kind = list_displays(self._graph.survey()).get(name, "")
+        self._show(Look(name, color if kind in _NEED_COLOR else ""))
         self._changed()
-
-    def _found(self) -> dict[str, str]:
-        """Return the topics that can be shown, with their types."""
-        return {
-            one.name: short_type(kind)
-            for one in list_topics(self._graph.survey().view.tokens)
-            for kind in one.types
-            if short_type(kind) in DRAWN_TYPES
-        }
 
     # What the address holds.
 
@@ -201,9 +194,11 @@ class _ScenePage:
 
     def _refresh_lists(self) -> None:
         shown = {one.look.name for one in self._shown}
-        options = {GRID: "grid", TF: "tf (frames)"}
-        options |= {name: f"{name} ({kind})" for name, kind in sorted(self._found().items())}
-        options = {name: text for name, text in options.items() if name not in shown}
+        options = {
+            name: f"{name} ({kind})"
+            for name, kind in list_displays(self._graph.survey()).items()
+            if name not in shown
+        }
         if self._add.options != options:
             self._add.set_options(options)
         names = self._frames.names()
@@ -224,7 +219,10 @@ class _ScenePage:
 
     def _open_shown(self, shown: _Shown) -> None:
         try:
-            shown.open(self._open(shown.look))
+            display = open_display(
+                self._system, self._graph.survey(), self._frames, self._meshes, shown.look
+            )
+            shown.open(display)
         except RoszError as error:
             shown.wait(str(error) if self._graph.complete else "")
 
@@ -255,7 +253,7 @@ class _Shown:
                     f'dense size=sm aria-label="Show {look.name}"'
                 )
                 ui.label(look.name).classes("font-semibold break-all grow min-w-0 pl-1")
-                ui.button(icon="tune", on_click=self._toggle).props(
+                self._tune = ui.button(icon="tune", on_click=self._toggle).props(
                     f'flat dense round size=sm aria-label="Settings of {look.name}"'
                 )
                 ui.button(icon="close", on_click=lambda: remove(self)).props(
@@ -272,6 +270,7 @@ class _Shown:
 
     def _add_settings(self, kind: str) -> None:
         choices = _CHOICES.get(kind, {})
+        self._tune.set_visibility(not {kind} & _OWN_COLORS & _OWN_SIZES or bool(choices))
         with self._settings:
             if choices:
                 ui.select(

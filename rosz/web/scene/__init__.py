@@ -4,30 +4,22 @@ A `Display` receives messages while it is shown, and draws the newest one in the
 fixed frame when a browser asks for it. Needs numpy.
 """
 
-from rosz.web.scene.display import DRAWN_TYPES, Display, FrameDisplay, GridDisplay, TopicDisplay
-from rosz.web.scene.setup import (
-    DEFAULT,
-    GRID,
-    ROBOT,
-    TF,
-    Look,
-    Setup,
-    format_setup,
-    read_setup,
-)
+from rosz.web.scene.display import Display
+from rosz.web.scene.meshes import Meshes
+from rosz.web.scene.opening import list_displays, open_display
+from rosz.web.scene.setup import DEFAULT, GRID, ROBOT, TF, Look, Setup, format_setup, read_setup
 
 __all__ = (
     "DEFAULT",
-    "DRAWN_TYPES",
     "GRID",
     "ROBOT",
     "TF",
     "Display",
-    "FrameDisplay",
-    "GridDisplay",
     "Look",
+    "Meshes",
     "Setup",
-    "TopicDisplay",
     "format_setup",
+    "list_displays",
+    "open_display",
     "read_setup",
 )

@@ -17,7 +17,7 @@ from rosz.transforms import IDENTITY, Pose
 from rosz.web.model import Frames, read_frame
 from rosz.web.scene import poses, sensors
 from rosz.web.scene.colors import color_bytes
-from rosz.web.scene.drawing import Drawing
+from rosz.web.scene.drawing import MEDIA, Drawing
 from rosz.web.scene.setup import Look
 from rosz.web.scene.shapes import draw_axes
 
@@ -29,7 +29,6 @@ __all__ = ("DRAWN_TYPES", "Display", "FrameDisplay", "GridDisplay", "TopicDispla
 
 _QUEUE = 10
 _MOST_BYTES = 32 << 20
-_MEDIA = "application/octet-stream"
 
 _Draw = Callable[[Any, Pose, Look, Drawing], str]
 _DRAW: dict[str, _Draw] = {
@@ -105,7 +104,7 @@ class GridDisplay:
         drawing = Drawing()
         if self.look.visible:
             self.status = poses.draw_grid(self.look, drawing)
-        return drawing.encode(), _MEDIA
+        return drawing.encode(), MEDIA
 
     def close(self) -> None:
         """Do nothing."""
@@ -142,7 +141,7 @@ class FrameDisplay:
         drawing = Drawing()
         if look.visible:
             self._draw(look, fixed, drawing)
-        return drawing.encode(), _MEDIA
+        return drawing.encode(), MEDIA
 
     def _draw(self, look: Look, fixed: str, drawing: Drawing) -> None:
         found: list[Pose] = []
@@ -294,7 +293,7 @@ class TopicDisplay:
                 self.fault = ""
             except RoszError as error:
                 self.fault = str(error)
-        return drawing.encode(), _MEDIA
+        return drawing.encode(), MEDIA
 
     def close(self) -> None:
         """Unsubscribe."""

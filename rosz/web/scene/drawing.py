@@ -15,11 +15,13 @@ import numpy as np
 
 from rosz.transforms import Pose
 
-__all__ = ("Array", "Drawing", "Shape", "matrix_of", "moved", "placed")
+__all__ = ("MEDIA", "Array", "Drawing", "Shape", "matrix_of", "moved", "placed")
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 Shape: TypeAlias = Literal["cube", "sphere", "cylinder", "cone"]
 
+MEDIA = "application/octet-stream"
+"""The media type of a drawing."""
 _ALIGNMENT = 4
 _OPAQUE = 255
 _MOST_SHAPES = 200_000

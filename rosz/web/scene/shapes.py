@@ -30,6 +30,7 @@ def draw_arrows(
     length: float,
     width: float,
     head: float = 0.3,
+    shaft: float = 0.0,
 ) -> None:
     """Draw arrows along x.
 
@@ -38,16 +39,18 @@ def draw_arrows(
         matrices: Their poses.
         colors: Their colors.
         length: Length in metres.
-        width: Diameter of the head in metres; the shaft has half of it.
+        width: Diameter of the head in metres.
         head: Length of the head, as a part of the whole.
+        shaft: Diameter of the shaft in metres; 0 for half of that of the head.
     """
     if not matrices:
         return
     stem = length * (1 - head)
-    shaft = placed(Pose((stem / 2, 0, 0), _ALONG_X), width / 2, width / 2, stem)
+    thick = shaft or width / 2
+    rod = placed(Pose((stem / 2, 0, 0), _ALONG_X), thick, thick, stem)
     tip = placed(Pose((stem + length * head / 2, 0, 0), _ALONG_X), width, width, length * head)
     poses = np.array(matrices)
-    drawing.shapes("cylinder", poses @ shaft, colors)
+    drawing.shapes("cylinder", poses @ rod, colors)
     drawing.shapes("cone", poses @ tip, colors)
 
 

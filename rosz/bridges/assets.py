@@ -1,4 +1,4 @@
-"""Files of packages that clients fetch, such as meshes and textures of a robot."""
+"""Files of packages that browsers and other clients fetch, such as meshes of a robot."""
 
 from __future__ import annotations
 

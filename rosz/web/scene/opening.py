@@ -1,0 +1,69 @@
+"""Opening displays by their names and the types of topics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosz.errors import NotFoundError, UsageError
+from rosz.introspect.subscribe import topic_types
+from rosz.introspect.topics import list_topics
+from rosz.names import short_type
+from rosz.web.model import Frames, System
+from rosz.web.scene.display import DRAWN_TYPES, Display, FrameDisplay, GridDisplay, TopicDisplay
+from rosz.web.scene.markers import MARKER_TYPES, MarkerDisplay
+from rosz.web.scene.meshes import Meshes
+from rosz.web.scene.robot import DESCRIPTION, RobotDisplay
+from rosz.web.scene.setup import GRID, ROBOT, TF, Look
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+
+__all__ = ("list_displays", "open_display")
+
+_TYPES = DRAWN_TYPES | MARKER_TYPES
+
+
+def list_displays(survey: Survey) -> dict[str, str]:
+    """Return the names of all displays that there can be, with what they show."""
+    found = {GRID: "grid", TF: "frames", ROBOT: DESCRIPTION}
+    topics = {
+        one.name: short_type(kind)
+        for one in list_topics(survey.view.tokens)
+        for kind in one.types
+        if short_type(kind) in _TYPES
+    }
+    return found | dict(sorted(topics.items()))
+
+
+def open_display(
+    system: System, survey: Survey, frames: Frames, meshes: Meshes, look: Look
+) -> Display:
+    """Open a display.
+
+    Args:
+        system: The system.
+        survey: The running nodes.
+        frames: The frames.
+        meshes: The meshes.
+        look: Settings of the display.
+
+    Raises:
+        RoszError: It cannot be opened, or not yet.
+    """
+    name, node = look.name, system.node
+    if name == GRID:
+        return GridDisplay(look)
+    if name == TF:
+        return FrameDisplay(look, frames)
+    if name.partition(":")[0] == ROBOT:
+        system.permission.check("get", name.partition(":")[2] or DESCRIPTION)
+        return RobotDisplay(node, look, frames, meshes)
+    system.permission.check("subscribe", name)
+    types = [short_type(one) for one in topic_types(survey.view).get(name, ())]
+    if not types:
+        raise NotFoundError(f"topic '{name}' does not exist yet")
+    if types[0] in MARKER_TYPES:
+        return MarkerDisplay(node, survey, look, frames, meshes)
+    if types[0] not in DRAWN_TYPES:
+        raise UsageError(f"topic '{name}' is of type {types[0]}, which is not drawn")
+    return TopicDisplay(node, survey, look, frames)

@@ -1,0 +1,232 @@
+"""A robot by its description (URDF): what its links look like, where their frames are."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import TYPE_CHECKING, Any, NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from rosz.errors import RoszError, TransformError, UsageError
+from rosz.transforms import Pose, compose, from_rpy
+from rosz.web.model import Frames
+from rosz.web.scene.colors import color_bytes
+from rosz.web.scene.drawing import MEDIA, Array, Drawing, placed
+from rosz.web.scene.meshes import Meshes
+from rosz.web.scene.setup import ROBOT, Look
+
+if TYPE_CHECKING:
+    from rosz.node import Node
+
+__all__ = ("DESCRIPTION", "RobotDisplay", "Visual", "draw_visual", "read_visuals")
+
+DESCRIPTION = "/robot_description"
+_GRAY = color_bytes("#c4c9d4")
+_SOME = 3
+
+
+class Visual(NamedTuple):
+    """A part of what a link looks like.
+
+    Attributes:
+        link: Name of the link.
+        origin: Its pose in the link.
+        shape: ``cube``, ``sphere``, ``cylinder``, or a URI of a mesh.
+        size: Its size in metres, or the scale of the mesh.
+        color: Its color; None for that of the mesh.
+    """
+
+    link: str
+    origin: Pose
+    shape: str
+    size: tuple[float, float, float]
+    color: Array | None
+
+
+def read_visuals(description: str) -> list[Visual]:
+    """Return what the links of a URDF look like.
+
+    Raises:
+        UsageError: It is not XML or not a URDF, or a number in it is not one.
+    """
+    try:
+        robot = ET.fromstring(description)  # noqa: S314  # a parameter of this system
+    except ET.ParseError as error:
+        raise UsageError(f"the description of the robot is not XML: {error}") from error
+    if robot.tag != "robot":
+        raise UsageError(f"the description of the robot has <{robot.tag}>; expected <robot> (URDF)")
+    materials = {one.get("name", ""): one for one in robot.iter("material") if len(one)}
+    found: list[Visual] = []
+    for link in robot.findall("link"):
+        name = link.get("name", "")
+        for visual in link.findall("visual"):
+            try:
+                one = _read_visual(name, visual, materials)
+            except ValueError as error:
+                raise UsageError(f"link '{name}': {error}; expected numbers") from error
+            if one is not None:
+                found.append(one)
+    return found
+
+
+def _read_visual(link: str, visual: ET.Element, materials: dict[str, ET.Element]) -> Visual | None:
+    geometry = visual.find("geometry")
+    if geometry is None or not len(geometry):
+        return None
+    origin = visual.find("origin")
+    pose = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    if origin is not None:
+        x, y, z = _numbers(origin.get("xyz", "0 0 0"))
+        pose = Pose((x, y, z), from_rpy(*_numbers(origin.get("rpy", "0 0 0"))))
+    shape = geometry[0]
+    color = _color_of(visual.find("material"), materials)
+    if shape.tag == "box":
+        return Visual(link, pose, "cube", _numbers(shape.get("size", "")), color)
+    if shape.tag == "sphere":
+        width = 2 * float(shape.get("radius", ""))
+        return Visual(link, pose, "sphere", (width, width, width), color)
+    if shape.tag == "cylinder":
+        width, length = 2 * float(shape.get("radius", "")), float(shape.get("length", ""))
+        return Visual(link, pose, "cylinder", (width, width, length), color)
+    if shape.tag == "mesh":
+        scale = _numbers(shape.get("scale", "1 1 1"))
+        return Visual(link, pose, shape.get("filename", ""), scale, color)
+    return Visual(link, pose, f"<{shape.tag}>", (1.0, 1.0, 1.0), color)
+
+
+def _numbers(text: str) -> tuple[float, float, float]:
+    x, y, z = map(float, text.split())
+    if not all(map(math.isfinite, (x, y, z))):
+        raise ValueError(f"'{text}' is not finite")
+    return x, y, z
+
+
+def _color_of(material: ET.Element | None, materials: dict[str, ET.Element]) -> Array | None:
+    if material is None:
+        return None
+    known = (
+        material
+        if material.find("color") is not None
+        else materials.get(material.get("name", ""), material)
+    )
+    color = known.find("color")
+    if color is None:
+        return None
+    values = np.array([float(value) for value in color.get("rgba", "").split()])
+    if len(values) != 4:  # noqa: PLR2004  # red, green, blue, opacity
+        raise ValueError(f"the color '{color.get('rgba')}' has {len(values)} numbers")
+    found: Array = (np.clip(values, 0, 1) * 255).round().astype(np.uint8)
+    return found
+
+
+def draw_visual(visual: Visual, link: Pose, meshes: Meshes, drawing: Drawing) -> None:
+    """Draw a part of a link.
+
+    Args:
+        visual: The part.
+        link: Pose of the link in the fixed frame.
+        meshes: The meshes.
+        drawing: The drawing.
+
+    Raises:
+        UsageError: The mesh cannot be shown.
+    """
+    matrix = placed(compose(link, visual.origin), *visual.size)
+    color = visual.color
+    if visual.shape in {"cube", "sphere", "cylinder"}:
+        drawing.shapes(visual.shape, matrix, _GRAY if color is None else color)  # type: ignore[arg-type]
+        return
+    mesh = meshes.find(visual.shape)
+    drawing.mesh(mesh.address, mesh.form, matrix, None if mesh.colored else color)
+
+
+class RobotDisplay:
+    """A robot whose description is a parameter.
+
+    Args:
+        node: The node that reads it.
+        look: Its settings; the name is ``robot``, or ``robot:`` and the name of the parameter.
+        frames: The frames.
+        meshes: The meshes.
+    """
+
+    kind = "Robot"
+
+    def __init__(self, node: Node, look: Look, frames: Frames, meshes: Meshes) -> None:
+        self.look = look
+        self.status = ""
+        self.fault = ""
+        self._name = look.name.removeprefix(ROBOT).removeprefix(":") or DESCRIPTION
+        self._node = node
+        self._frames = frames
+        self._meshes = meshes
+        self._lock = threading.Lock()
+        self._text: Any = None
+        self._visuals: list[Visual] = []
+        self._unusable = ""
+        self._fixed = ""
+        self._version = 0
+        self._shown: tuple[Any, ...] = ()
+        self._watch = node.params.watch(self._name, lambda _: self._read())
+        self._read()
+
+    def _read(self) -> None:
+        text = self._node.params.get(self._name, None)
+        with self._lock:
+            if text == self._text and self._version:
+                return
+            self._text = text
+            self._version += 1
+            self._visuals, self._unusable = [], ""
+            if not isinstance(text, str):
+                self._unusable = f"no parameter '{self._name}' holds the URDF of a robot"
+                return
+            try:
+                self._visuals = read_visuals(text)
+            except UsageError as error:
+                self._unusable = str(error)
+
+    def refresh(self, fixed: str) -> bool:
+        """Return whether a frame moved, or the description changed."""
+        self._fixed = fixed
+        return self._shown != (self.look, fixed, self._version, self._frames.version)
+
+    def encoded(self) -> tuple[bytes, str]:
+        """Return the drawing of the robot."""
+        with self._lock:
+            look, fixed, visuals = self.look, self._fixed, self._visuals
+            self._shown = look, fixed, self._version, self._frames.version
+            unusable = self._unusable
+        drawing = Drawing()
+        if look.visible:
+            faults = self._draw(visuals, fixed, drawing)
+            self.status = "" if unusable else f"{len({one.link for one in visuals})} links"
+            self.fault = unusable or "; ".join(faults)
+        return drawing.encode(), MEDIA
+
+    def _draw(self, visuals: list[Visual], fixed: str, drawing: Drawing) -> list[str]:
+        """Draw all links, and return what cannot be drawn."""
+        lost: dict[str, str] = {}
+        faults: dict[str, None] = {}
+        for visual in visuals:
+            try:
+                pose = self._frames.find(fixed, visual.link)
+            except TransformError as error:
+                lost.setdefault(visual.link, str(error).strip())
+                continue
+            try:
+                draw_visual(visual, pose, self._meshes, drawing)
+            except RoszError as error:
+                faults[f"link '{visual.link}': {error}"] = None
+        found = list(faults)
+        if lost:
+            links = ", ".join(list(lost)[:_SOME]) + " …" * (len(lost) > _SOME)
+            why = next(iter(lost.values()))
+            found.insert(0, f"no transform to '{fixed}' of {len(lost)} links ({links}): {why}")
+        return found
+
+    def close(self) -> None:
+        """Watch the parameter no longer."""
+        self._watch.close()
