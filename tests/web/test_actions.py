@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
 from typing import Any
 
 import pytest
@@ -12,6 +11,7 @@ from network import TIMEOUT, Network, eventually
 from rosz.errors import NotFoundError, UsageError, YamlError
 from rosz.introspect.rosout import LogFilter
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
+from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import (
     PoseStamped,
     PoseWithCovarianceStamped,
@@ -19,7 +19,7 @@ from rosz.msgs.geometry_msgs.msg import (
     Vector3,
 )
 from rosz.msgs.sensor_msgs.msg import BatteryState, Image
-from rosz.msgs.std_msgs.msg import Float64MultiArray, String
+from rosz.msgs.std_msgs.msg import Float64MultiArray, Header, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.web.model import (
     Driver,
@@ -38,7 +38,7 @@ from rosz.web.model import (
     split_fields,
 )
 from rosz.web.model.forms import FormField, form_fields, read_form
-from rosz.web.model.plotting import Series
+from rosz.web.model.plotting import Series, plottable_fields
 
 
 def test_forms_have_all_fields_and_take_some() -> None:
@@ -274,7 +274,7 @@ def test_fields_are_plotted_while_a_page_wants_them(network: Network) -> None:
         return len(plot.series()) == 4
 
     eventually(arrived, "all series")
-    newest = {one.name: one.values[-1] for one in plot.series()}
+    newest = {one.name: one.points()[1][-1] for one in plot.series()}
     assert newest == {
         "/twist/linear/x": 1.0,
         "/twist/linear/y": 2.0,
@@ -289,13 +289,57 @@ def test_fields_are_plotted_while_a_page_wants_them(network: Network) -> None:
 
 
 def test_many_points_keep_their_extremes() -> None:
-    times = deque(float(number) for number in range(10_000))
-    values = deque(9.0 if number == 7777 else 0.0 for number in range(10_000))
-    points = Series("/a", times, values).since(100.0, 600)
+    series = Series("/a")
+    for number in range(10_000):
+        series.add(float(number), 9.0 if number == 7777 else 0.0)
+    points = series.within(100.0, 9_000.0, 600)
     assert len(points) <= 620
     assert (7777.0, 9.0) in points
-    assert all(time >= 100.0 for time, _ in points)
+    assert all(100.0 <= time <= 9_000.0 for time, _ in points)
     assert points == sorted(points)
+    series.add(5.0, 1.0)
+    assert series.points() == ([5.0], [1.0])
+
+
+def test_points_are_bounded() -> None:
+    series = Series("/a")
+    for number in range(200_000):
+        series.add(float(number), 0.0)
+    times, _ = series.points()
+    assert 60_000 <= len(times) <= 66_000
+    assert times[-1] == series.newest == 199_999.0
+
+
+def test_fields_of_numbers_are_offered() -> None:
+    assert list(plottable_fields(Twist))[:2] == ["linear/x", "linear/y"]
+    assert list(plottable_fields(Float64MultiArray)) == [
+        "layout/dim[0]/size",
+        "layout/dim[0]/stride",
+        "layout/data_offset",
+        "data",
+    ]
+    assert list(plottable_fields(String)) == []
+    assert "header/stamp" in plottable_fields(PoseStamped)
+
+
+def test_the_stamp_in_the_header_is_the_time_where_that_is_chosen(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    publisher = robot.publisher("pose", PoseStamped)
+    graph = System(page, Permission()).graph.use().value
+    eventually(lambda: graph.survey().view.publishers("/pose"), "the publisher")
+    plot = Plot(page, stamped=True)
+    assert "pose/position/x" in plot.offered(graph.survey())["/pose"]
+    plot.add(graph.survey(), "/pose/header/stamp")
+    message = PoseStamped(header=Header(stamp=Time(12, 500_000_000)))
+
+    def arrived() -> bool:
+        publisher.publish(message)
+        return bool(plot.series())
+
+    eventually(arrived, "the series")
+    assert plot.series()[0].points()[0][0] == 12.5
+    assert plot.series()[0].points()[1][0] == 12.5
+    plot.close()
 
 
 def test_colons_and_commas_part_fields() -> None:

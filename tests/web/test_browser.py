@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from network import Network, eventually
@@ -129,6 +130,41 @@ def test_a_key_drives_as_long_as_it_is_held(world: World) -> None:
     keys.key_up(Keys.ARROW_UP).perform()
     world.robot.wait_for("drives 0.0", LONG)
     world.should_see("It stands.")
+    assert world.messages() == []
+
+
+_DRAG = """
+const [from, to] = [...arguments].map((one) => document.querySelector(one));
+if (!from || !to) return false;
+const data = new DataTransfer();
+from.dispatchEvent(new DragEvent('dragstart', {dataTransfer: data, bubbles: true}));
+for (const kind of ['dragover', 'drop']) {
+  to.dispatchEvent(new DragEvent(kind, {dataTransfer: data, bubbles: true, cancelable: true}));
+}
+return true;
+"""
+
+
+def test_a_field_is_dragged_into_the_plot_and_the_picture_saved(
+    world: World, tmp_path: Path
+) -> None:
+    set_screen(world.browser, "laptop", "light")
+    world.browser.execute_cdp_cmd(
+        "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)}
+    )
+    world.open("/plot")
+    world.should_see("/wave", "No field is plotted")
+    world.click("/wave")
+    leaf = ".q-tree span[draggable]"
+    drag = (leaf, ".nicegui-content .grow.min-w-0")
+    eventually(lambda: world.browser.execute_script(_DRAG, *drag), "a field to drag", LONG)
+    world.should_see("/wave/data")
+    eventually(lambda: "fields=/wave/data" in world.browser.current_url, "the address", LONG)
+    world.click("PNG")
+    eventually((tmp_path / "plot.png").exists, "the picture", LONG)
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+    world.open("/plot?fields=/wave/data@2&window=30&times=stamp")
+    world.should_see("/wave/data\n2", "30 s", "Header stamp")
     assert world.messages() == []
 
 

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import threading
 import time
 from array import array
-from collections import deque
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-import msgspec
-
-from rosz.errors import UsageError
+from rosz.errors import RoszError, UsageError
 from rosz.introspect.fields import FieldPath, find_target
 from rosz.introspect.subscribe import topic_types
+from rosz.message import slot_type, slots
 from rosz.time import DurationValue, TimeValue
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
     from rosz.node import Node
 
-__all__ = ("Plot", "Series", "split_fields")
+__all__ = ("Plot", "Series", "plottable_fields", "split_fields")
 
 _MOST_POINTS = 60_000
+_SPARE_POINTS = 6_000
+"""Points that are kept beyond that, so that the oldest are forgotten many at a time."""
+_DEEPEST = 6
+_MOST_FIELDS = 200
 _MOST_ELEMENTS = 50
 _QUEUE = 200
 
@@ -49,58 +54,102 @@ def _parts(word: str) -> list[str]:
     return [one for one in parts if one] or [word]
 
 
-class Series(msgspec.Struct):
-    """The points of one field.
+class Series:
+    """The newest points of one field; safe to use from several threads.
 
-    Attributes:
+    Args:
         name: The field, with its topic.
-        times: Times of arrival, in seconds since the Unix epoch.
-        values: The values.
     """
 
-    name: str
-    times: deque[float]
-    values: deque[float]
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._lock = threading.Lock()
+        self._times: list[float] = []
+        self._values: list[float] = []
 
-    def since(self, begin: float, most: int) -> list[tuple[float, float]]:
-        """Return the points from a time on; of many, the lowest and highest of each part.
+    @property
+    def newest(self) -> float:
+        """Time of the newest point in seconds since the Unix epoch; 0 without one."""
+        times = self._times
+        return times[-1] if times else 0.0
+
+    def add(self, moment: float, value: float) -> None:
+        """Add a point; one that is older than the newest begins the series again.
+
+        Args:
+            moment: Time in seconds since the Unix epoch.
+            value: The value.
+        """
+        with self._lock:
+            if self._times and moment < self._times[-1]:
+                self._times.clear()
+                self._values.clear()
+            self._times.append(moment)
+            self._values.append(value)
+            if len(self._times) > _MOST_POINTS + _SPARE_POINTS:
+                del self._times[:_SPARE_POINTS]
+                del self._values[:_SPARE_POINTS]
+
+    def points(self, begin: float = 0.0, end: float = math.inf) -> tuple[list[float], list[float]]:
+        """Return times and values of all points from one time to another."""
+        with self._lock:
+            first, last = bisect_left(self._times, begin), bisect_right(self._times, end)
+            return self._times[first:last], self._values[first:last]
+
+    def within(self, begin: float, end: float, most: int) -> list[tuple[float, float]]:
+        """Return points from one time to another; of many, the lowest and highest of each part.
 
         Args:
             begin: Time in seconds since the Unix epoch.
+            end: The same.
             most: Largest number of points.
         """
-        points = [
-            (t, v)
-            for t, v in zip(self.times.copy(), self.values.copy(), strict=False)
-            if t >= begin
-        ]
-        if len(points) <= most:
-            return points
-        size = -(-len(points) * 2 // most)
+        times, values = self.points(begin, end)
+        if len(times) <= most:
+            return list(zip(times, values, strict=True))
+        size = -(-len(times) * 2 // most)
         return [
-            one
-            for start in range(0, len(points), size)
-            for one in _extremes(points[start : start + size])
+            (times[index], values[index])
+            for start in range(0, len(times), size)
+            for index in _extremes(values, start, start + size)
         ]
 
 
-def _extremes(points: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    low = min(points, key=lambda point: point[1])
-    high = max(points, key=lambda point: point[1])
-    yield from sorted({low, high})
+def _extremes(values: list[float], start: int, end: int) -> list[int]:
+    part = values[start:end]
+    return sorted({start + part.index(min(part)), start + part.index(max(part))})
+
+
+def plottable_fields(cls: type[Any], depth: int = 0) -> Iterator[str]:
+    """Yield the fields of a message class that can be plotted, such as ``pose/x``.
+
+    Args:
+        cls: The class.
+        depth: Number of messages that it is in.
+    """
+    for slot in slots(cls):
+        kind = slot_type(slot).partition("[")[0]
+        if "/" not in kind:
+            if not kind.startswith(("string", "wstring")):
+                yield slot.name
+        elif depth < _DEEPEST and not isinstance(slot.kind, str):
+            index = "" if slot.shape == "one" else "[0]"
+            for name in plottable_fields(slot.kind, depth + 1):
+                yield f"{slot.name}{index}/{name}"
 
 
 class _Feed:
     """The subscription of one topic, and the fields that are plotted of it."""
 
-    def __init__(self, node: Node, topic: str, type_name: str) -> None:
+    def __init__(self, node: Node, topic: str, type_name: str, *, stamped: bool) -> None:
         self.paths: dict[str, FieldPath] = {}
         self.series: dict[str, Series] = {}
         cls = node.context.types.message(type_name)
+        self._stamped = stamped and cls._has_header
         self._subscription = node.subscription(topic, cls, self._receive, queue_size=_QUEUE)
 
     def _receive(self, message: Any) -> None:
-        now = time.time()
+        now = message.header.stamp.to_sec() if self._stamped else time.time()
         for name, path in list(self.paths.items()):
             try:
                 value = path.read(message)
@@ -109,11 +158,8 @@ class _Feed:
             for key, number in _numbers(name, value):
                 series = self.series.get(key)
                 if series is None:
-                    series = self.series[key] = Series(
-                        key, deque(maxlen=_MOST_POINTS), deque(maxlen=_MOST_POINTS)
-                    )
-                series.times.append(now)
-                series.values.append(number)
+                    series = self.series[key] = Series(key)
+                series.add(now, number)
 
     def close(self) -> None:
         self._subscription.close()
@@ -134,10 +180,13 @@ class Plot:
 
     Args:
         node: The node that subscribes to their topics.
+        stamped: Whether the time of a point is that in the header of its message, where there is
+            one, and not that of its arrival.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, *, stamped: bool = False) -> None:
         self._node = node
+        self._stamped = stamped
         self._lock = threading.Lock()
         self._feeds: dict[str, _Feed] = {}
         self._topics: dict[str, str] = {}
@@ -164,9 +213,23 @@ class Plot:
         with self._lock:
             feed = self._feeds.get(target.topic)
             if feed is None:
-                feed = self._feeds[target.topic] = _Feed(self._node, target.topic, target.type_name)
+                feed = self._feeds[target.topic] = _Feed(
+                    self._node, target.topic, target.type_name, stamped=self._stamped
+                )
             feed.paths[name] = target.path
             self._topics[name] = target.topic
+
+    def offered(self, survey: Survey) -> dict[str, list[str]]:
+        """Return the fields that can be plotted, by topic; topics of unknown types have none."""
+        found: dict[str, list[str]] = {}
+        for topic, types in topic_types(survey.view).items():
+            try:
+                cls = self._node.context.types.message(types[0])
+            except RoszError:
+                continue
+            if fields := list(itertools.islice(plottable_fields(cls), _MOST_FIELDS)):
+                found[topic] = fields
+        return dict(sorted(found.items()))
 
     def remove(self, name: str) -> None:
         """Plot a field no longer."""
@@ -194,8 +257,8 @@ class Plot:
         """Return all points as CSV: time, field, value."""
         lines = ["time,field,value"]
         for one in self.series():
-            points = zip(one.times.copy(), one.values.copy(), strict=False)
-            lines += [f"{t:.6f},{one.name},{v!r}" for t, v in points]
+            times, values = one.points()
+            lines += [f"{t:.6f},{one.name},{v!r}" for t, v in zip(times, values, strict=True)]
         return "\n".join([*lines, ""])
 
     def close(self) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import time
 from typing import Any
 from urllib.parse import urlencode
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from rosz.errors import RoszError
 from rosz.web.model import Plot, System, split_fields
@@ -15,8 +17,16 @@ from rosz.web.pages.layout import Frame, address_of, empty_state
 __all__ = ("show_plot",)
 
 _PERIOD = 0.2
+_LIST_PERIOD = 2.0
+_SLOWEST = 5.0
+"""Seconds after which the next picture is sent to a browser that has not drawn the last one."""
 _WINDOWS = {5: "5 s", 10: "10 s", 30: "30 s", 60: "1 min", 300: "5 min"}
-_MOST = 600
+_TIMES = {"arrival": "Arrival", "stamp": "Header stamp"}
+_MOST, _FEWEST, _TOGETHER = 600, 120, 6000
+"""Points that are drawn of one series, of one of many, and of all."""
+_AXES = 4
+_OFFSET = 52
+_PICTURE_SECONDS = 10.0
 _COLORS = [
     "#2f6fed",
     "#e07b1a",
@@ -29,66 +39,161 @@ _COLORS = [
     "#5b6b85",
     "#a0612d",
 ]
+_LEAF = """<span v-if="props.node.field" draggable="true" class="cursor-grab"
+@dragstart="(event) => event.dataTransfer.setData('text/plain', props.node.field)">
+{{ props.node.name }}</span><span v-else>{{ props.node.name }}</span>"""
+_DROP = "(event) => { event.preventDefault(); emit(event.dataTransfer.getData('text/plain')); }"
 
 
-def show_plot(system: System, fields: str, window: int) -> None:
+def show_plot(system: System, fields: str, window: int, times: str) -> None:
     """Build the page.
 
     Args:
         system: The system.
-        fields: Fields to plot, such as ``/turtle1/pose/x:y``.
+        fields: Fields to plot, such as ``/turtle1/pose/x:y``; ``@2`` puts one on the second axis.
         window: Seconds that are shown.
+        times: ``arrival``, or ``stamp`` for the time in headers.
     """
-    _PlotPage(system, split_fields(fields), window if window in _WINDOWS else 10)
+    axes: dict[str, int] = {}
+    for word in fields.replace(",", " ").split():
+        text, _, axis = word.partition("@")
+        number = int(axis) if axis.isdecimal() else 1
+        axes |= dict.fromkeys(split_fields(text), min(_AXES, max(1, number)))
+    chosen = window if window in _WINDOWS else 10
+    _PlotPage(system, axes, chosen, times if times in _TIMES else "arrival")
 
 
 class _PlotPage:
     """The chart and the fields in it."""
 
-    def __init__(self, system: System, fields: list[str], window: int) -> None:
+    def __init__(self, system: System, axes: dict[str, int], window: int, times: str) -> None:
         self._frame = frame = Frame(system, "Plot", "/plot")
         self._graph = frame.use(system.graph)
         self._system = system
-        self._plot = Plot(system.node)
-        frame.keep(self._plot)
-        self._wanted = fields
+        self._times = times
+        self._plot = Plot(system.node, stamped=times == "stamp")
+        frame.keep(self)
+        self._axes = axes
+        self._wanted = list(axes)
         self._window = window
         self._paused = False
         self._end = time.time()
+        self._is_drawn = True
+        self._drew = 0.0
+        self._offered: dict[str, list[str]] = {}
         with frame.content:
-            with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-                self._input = ui.input("Field", placeholder="/turtle1/pose/x:y").props("dense")
-                self._input.classes("grow min-w-52").on("keydown.enter", self._add)
-                ui.button("Add", icon="add", on_click=self._add).props("flat dense no-caps")
-                ui.select(
-                    _WINDOWS,
-                    value=window,
-                    label="Window",
-                    on_change=lambda change: self._choose(change.value),
-                ).props("dense options-dense").classes("w-24")
-                self._pause = ui.button("Pause", icon="pause", on_click=self._toggle).props(
-                    "flat dense no-caps"
-                )
-                ui.button(
-                    "CSV",
-                    icon="download",
-                    on_click=lambda: ui.download.content(self._plot.table(), "plot.csv"),
-                ).props("flat dense no-caps")
+            self._add_choices()
             self._chips = ui.row().classes("w-full gap-2")
-            self._empty = empty_state(
-                "show_chart",
-                "No field is plotted",
-                "Write a topic and a field of it above, such as this; x:y stands for two fields:",
-                "/turtle1/pose/x:y",
-            )
-            with ui.column().classes("rosz-card w-full p-2") as self._card:
-                self._chart = ui.echart(_options()).classes("w-full").style("height: 60vh")
+            with ui.row().classes("w-full gap-4 items-start"):
+                self._add_tree()
+                with (
+                    ui.column()
+                    .classes("grow min-w-0 gap-4")
+                    .style("flex-basis: 20rem")
+                    .on("dragover", js_handler="(event) => event.preventDefault()")
+                    .on("drop", self._drop, js_handler=_DROP)
+                ):
+                    self._empty = empty_state(
+                        "show_chart",
+                        "No field is plotted",
+                        "Write a topic and a field of it above, such as this, or drag one here;"
+                        " x:y stands for two fields:",
+                        "/turtle1/pose/x:y",
+                    )
+                    with ui.column().classes("rosz-card w-full p-2") as self._card:
+                        self._chart = ui.echart(_options()).classes("w-full")
+                        self._chart.style("height: 60vh")
+                        self._chart.on("chart:datazoom", lambda: self._set_paused(paused=True), [])
+                        self._chart.on("chart:finished", self._note_drawn, [])
         self._show_fields()
+        frame.every(_LIST_PERIOD, self._offer)
         frame.every(_PERIOD, self._refresh)
 
+    def _add_choices(self) -> None:
+        with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+            self._input = (
+                ui.input("Field", placeholder="/turtle1/pose/x:y", autocomplete=[])
+                .props("dense")
+                .classes("grow min-w-52")
+                .on("keydown.enter", self._add)
+            )
+            ui.button("Add", icon="add", on_click=self._add).props("flat dense no-caps")
+            ui.select(
+                _WINDOWS,
+                value=self._window,
+                label="Window",
+                on_change=lambda change: self._choose_window(change.value),
+            ).props("dense options-dense").classes("w-20")
+            ui.select(
+                _TIMES,
+                value=self._times,
+                label="Time",
+                on_change=lambda change: self._choose_times(change.value),
+            ).props("dense options-dense").classes("w-32")
+            self._pause = ui.button(
+                "Pause", icon="pause", on_click=lambda: self._set_paused(paused=not self._paused)
+            ).props("flat dense no-caps")
+            ui.button(
+                "CSV",
+                icon="download",
+                on_click=lambda: ui.download.content(self._plot.table(), "plot.csv"),
+            ).props("flat dense no-caps")
+            ui.button("PNG", icon="download", on_click=self._save_picture).props(
+                "flat dense no-caps"
+            )
+
+    def _add_tree(self) -> None:
+        with ui.expansion("Fields", icon="account_tree", value=not self._axes).classes(
+            "rosz-card w-full lg:w-72"
+        ):
+            ui.label("Drag a field into the chart, or choose it.").classes("rosz-soft text-sm")
+            self._tree = (
+                ui.tree([], node_key="id", label_key="name", on_select=self._select)
+                .props("dense no-transition")
+                .classes("rosz-mono w-full overflow-auto")
+                .style("max-height: 55vh")
+            )
+            self._tree.add_slot("default-header", _LEAF)
+
+    def _offer(self) -> None:
+        """Offer the fields that there are now."""
+        offered = self._plot.offered(self._graph.survey())
+        if offered == self._offered:
+            return
+        self._offered = offered
+        self._input.set_autocomplete(
+            [f"{topic}/{field}" for topic, fields in offered.items() for field in fields]
+        )
+        self._tree.props["nodes"] = [
+            {
+                "id": topic,
+                "name": topic,
+                "children": [
+                    {"id": f"{topic}/{field}", "name": field, "field": f"{topic}/{field}"}
+                    for field in fields
+                ],
+            }
+            for topic, fields in offered.items()
+        ]
+        self._tree.update()
+
+    def _drop(self, event: GenericEventArguments) -> None:
+        self._want(str(event.args or ""))
+
+    def _select(self, event: Any) -> None:
+        name = str(event.value or "")
+        if any(name == f"{topic}/{one}" for topic, ones in self._offered.items() for one in ones):
+            self._want(name)
+        elif name:
+            self._tree.expand([name])
+        self._tree.deselect()
+
     def _add(self) -> None:
-        self._wanted += split_fields(self._input.value or "")
+        self._want(self._input.value or "")
         self._input.set_value("")
+
+    def _want(self, text: str) -> None:
+        self._wanted += split_fields(text)
         self._open_wanted(final=True)
 
     def _open_wanted(self, *, final: bool) -> None:
@@ -118,47 +223,104 @@ class _PlotPage:
         fields = self._plot.fields
         with self._chips:
             for name in fields:
-                ui.chip(
+                axis = self._axes.setdefault(name, 1)
+                with ui.chip(
                     name,
                     removable=True,
                     color="secondary",
                     text_color="white",
+                    on_click=lambda name=name: self._change_axis(name),
                     on_value_change=lambda _, name=name: self._remove(name),
-                ).props("dense")
+                ).props("dense"):
+                    ui.badge(str(axis), color="primary").classes("ml-2")
+                    ui.tooltip(f"On axis {axis}; click for the next one")
         self._empty.set_visibility(not fields)
         self._card.set_visibility(bool(fields))
 
-    def _remove(self, name: str) -> None:
-        self._plot.remove(name)
+    def _change_axis(self, name: str) -> None:
+        self._axes[name] = self._axes[name] % _AXES + 1
         self._show_fields()
         self._show_address()
+        self._draw()
+
+    def _remove(self, name: str) -> None:
+        self._plot.remove(name)
+        self._axes.pop(name, None)
+        self._show_fields()
+        self._show_address()
+        self._draw()
 
     def _show_address(self) -> None:
-        query = urlencode(
-            {"fields": ",".join(self._plot.fields), "window": self._window}, safe="/,[]"
-        )
-        address_of(f"/plot?{query}")
+        fields = [
+            f"{name}@{axis}" if (axis := self._axes.get(name, 1)) > 1 else name
+            for name in (*self._plot.fields, *self._wanted)
+        ]
+        query: dict[str, Any] = {"fields": ",".join(fields), "window": self._window}
+        if self._times != "arrival":
+            query["times"] = self._times
+        address_of(f"/plot?{urlencode(query, safe='/,[]@:')}")
 
-    def _choose(self, window: int) -> None:
+    def _choose_window(self, window: int) -> None:
         self._window = window
         self._show_address()
         self._draw()
 
-    def _toggle(self) -> None:
-        self._paused = not self._paused
-        self._end = time.time()
-        self._pause.props(f"icon={'play_arrow' if self._paused else 'pause'}")
-        self._pause.set_text("Go on" if self._paused else "Pause")
+    def _choose_times(self, times: str) -> None:
+        """Begin again, since the points have other times."""
+        fields = self._plot.fields
+        self._plot.close()
+        self._times = times
+        self._plot = Plot(self._system.node, stamped=times == "stamp")
+        self._wanted = [*fields, *self._wanted]
+        self._open_wanted(final=False)
+        self._show_address()
+
+    def _set_paused(self, *, paused: bool) -> None:
+        if paused == self._paused:
+            return
+        self._paused = paused
+        self._pause.props(f"icon={'play_arrow' if paused else 'pause'}")
+        self._pause.set_text("Go on" if paused else "Pause")
+        if not paused:
+            self._chart.run_chart_method(
+                "dispatchAction", {"type": "dataZoom", "start": 0, "end": 100}
+            )
+
+    async def _save_picture(self) -> None:
+        back = "#1a1f29" if await self._is_dark() else "#ffffff"
+        wanted = {"type": "png", "pixelRatio": 2, "backgroundColor": back}
+        try:
+            address = await self._chart.run_chart_method(
+                "getDataURL", wanted, timeout=_PICTURE_SECONDS
+            )
+        except TimeoutError:
+            ui.notify("the browser did not give the picture", type="negative")
+            return
+        ui.download.content(base64.b64decode(str(address).partition(",")[2]), "plot.png")
+
+    async def _is_dark(self) -> bool:
+        script = "return document.body.classList.contains('body--dark')"
+        return bool(await ui.run_javascript(script, timeout=_PICTURE_SECONDS))
 
     def _refresh(self) -> None:
         if self._wanted:
             self._open_wanted(final=False)
-        if not self._paused and self._plot.fields:
-            self._end = time.time()
+        if self._paused or not self._plot.fields:
+            return
+        # A browser that draws slowly gets the next picture when it has drawn the last one.
+        if self._is_drawn or time.monotonic() - self._drew > _SLOWEST:
             self._draw()
 
+    def _note_drawn(self) -> None:
+        self._is_drawn = True
+
     def _draw(self) -> None:
+        found = self._plot.series()
+        if not self._paused:
+            newest = max((one.newest for one in found), default=0.0)
+            self._end = newest if self._times == "stamp" and newest else time.time()
         begin = self._end - self._window
+        most = min(_MOST, max(_FEWEST, _TOGETHER // max(1, len(found))))
         series = [
             {
                 "name": one.name,
@@ -166,29 +328,62 @@ class _PlotPage:
                 "showSymbol": False,
                 "animation": False,
                 "color": _COLORS[number % len(_COLORS)],
-                "data": [[round(t * 1000), v] for t, v in one.since(begin, _MOST)],
+                "yAxisIndex": self._axis(one.name) - 1,
+                "data": [[round(t * 1000), v] for t, v in one.within(begin, self._end, most)],
             }
-            for number, one in enumerate(self._plot.series())
+            for number, one in enumerate(found)
         ]
         options = self._chart.options
         options["series"] = series
         options["xAxis"]["min"] = round(begin * 1000)
         options["xAxis"]["max"] = round(self._end * 1000)
+        used = {one["yAxisIndex"] for one in series}
+        for index, axis in enumerate(options["yAxis"]):
+            axis["show"] = index in used or not (used or index)
+        self._is_drawn = False
+        self._drew = time.monotonic()
+        self._chart.update()
+
+    def _axis(self, name: str) -> int:
+        """Return the axis of a series, which may be of an element of a field."""
+        field = next(
+            (one for one in self._plot.fields if name == one or name.startswith(f"{one}[")), name
+        )
+        return self._axes.get(field, 1)
+
+    def close(self) -> None:
+        """Plot nothing any more."""
+        self._plot.close()
 
 
 def _options() -> dict[str, Any]:
     gray = "#8a94a6"
+    line = {"color": "#8a94a633"}
     axis = {
         "axisLabel": {"color": gray, "hideOverlap": True},
-        "splitLine": {"lineStyle": {"color": "#8a94a633"}},
+        "splitLine": {"lineStyle": line},
     }
     return {
         "animation": False,
         "grid": {"left": 12, "right": 16, "top": 40, "bottom": 12, "containLabel": True},
-        "legend": {"type": "scroll", "top": 4, "textStyle": {"color": gray}},
+        "legend": {"type": "scroll", "top": 4, "icon": "roundRect", "textStyle": {"color": gray}},
         "tooltip": {"trigger": "axis"},
-        "dataZoom": [{"type": "inside"}],
-        "xAxis": {"type": "time", **axis},
-        "yAxis": {"type": "value", "scale": True, **axis},
+        "dataZoom": [
+            {"type": "inside", "xAxisIndex": 0},
+            {"type": "inside", "yAxisIndex": [0, 1, 2, 3], "zoomOnMouseWheel": "shift"},
+        ],
+        "xAxis": {"type": "time", "axisLine": {"onZero": False}, **axis},
+        "yAxis": [
+            {
+                "type": "value",
+                "scale": True,
+                "position": "left" if number % 2 else "right",
+                "offset": _OFFSET * ((number - 1) // 2),
+                "show": number == 1,
+                **axis,
+                "splitLine": {"lineStyle": line, "show": number == 1},
+            }
+            for number in range(1, _AXES + 1)
+        ],
         "series": [],
     }

@@ -77,8 +77,8 @@ def _add_pages_of_nodes(system: System) -> None:
         show_parameters(system, prefix)
 
     @ui.page("/plot")
-    def plot(fields: str = "", window: int = 10) -> None:
-        show_plot(system, fields, window)
+    def plot(fields: str = "", window: int = 10, times: str = "arrival") -> None:
+        show_plot(system, fields, window, times)
 
     @ui.page("/reconfigure")
     def reconfigure(server: str = "") -> None:
