@@ -12,12 +12,8 @@ The names are imported on first use, so that a command loads only what it needs.
 
 from __future__ import annotations
 
-import gc
-import sys
-
 TYPE_CHECKING = False  # typing takes longer to import than everything else here
 if TYPE_CHECKING:
-    from types import FrameType
     from typing import Any
 
     from rosz.environment import Environment
@@ -52,6 +48,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'rosz' has no attribute '{name}'")
+    import gc
+
     from rosz.interrupts import InterruptDeferral
 
     collects = gc.isenabled()
@@ -64,26 +62,6 @@ def __getattr__(name: str) -> Any:
     finally:
         if collects:
             gc.enable()
-
-
-class _WithoutTypingExtensions:
-    """Refuses typing_extensions to msgspec, which then takes the same names from typing.
-
-    With what it imports in turn, typing_extensions takes an eighth of all imports of a node.
-    """
-
-    @staticmethod
-    def find_spec(name: str, _path: object = None, _target: object = None) -> None:
-        if name != "typing_extensions":
-            return
-        frame: FrameType | None = sys._getframe(1)  # noqa: SLF001  # else inspect would be imported
-        while frame is not None and "importlib" in frame.f_globals.get("__name__", ""):
-            frame = frame.f_back
-        if frame is not None and frame.f_globals.get("__name__") == "msgspec._utils":
-            raise ModuleNotFoundError(name)
-
-
-sys.meta_path.insert(0, _WithoutTypingExtensions)
 
 
 def __dir__() -> list[str]:
