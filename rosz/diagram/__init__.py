@@ -4,7 +4,7 @@
 DOT or Mermaid.
 """
 
-from rosz.diagram.drawing import write_dot, write_mermaid, write_svg
+from rosz.diagram.drawing import labels_of, write_dot, write_mermaid, write_svg
 from rosz.diagram.picture import CONTENTS, Box, Content, Picture, PictureOptions, make_picture
 
 __all__ = (
@@ -13,6 +13,7 @@ __all__ = (
     "Content",
     "Picture",
     "PictureOptions",
+    "labels_of",
     "make_picture",
     "write_dot",
     "write_mermaid",

@@ -8,7 +8,7 @@ from html import escape
 from rosz.diagram.layers import Layout, Place, lay_out
 from rosz.diagram.picture import Arrow, Box, Picture
 
-__all__ = ("label_of", "write_dot", "write_mermaid", "write_svg")
+__all__ = ("label_of", "labels_of", "write_dot", "write_mermaid", "write_svg")
 
 _FEW = 2
 _LETTER = 6.3
@@ -48,15 +48,27 @@ def label_of(arrow: Arrow, rates: Mapping[str, str]) -> str:
     )
 
 
+def labels_of(picture: Picture, rates: Mapping[str, str]) -> list[str]:
+    """Return the labels of all arrows.
+
+    Args:
+        picture: The picture.
+        rates: Rate of each topic as text.
+    """
+    return [label_of(arrow, rates) for arrow in picture.arrows]
+
+
 def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: str = "") -> str:
-    """Return a picture as SVG; each box has its key as ``data-key``.
+    """Return a picture as SVG.
+
+    Each box has its key as ``data-key``, and each label of an arrow its number as ``data-arrow``.
 
     Args:
         picture: The picture.
         rates: Rate of each topic as text, for the arrows.
         chosen: Key of the box to emphasise.
     """
-    labels = [label_of(arrow, rates or {}) for arrow in picture.arrows]
+    labels = labels_of(picture, rates or {})
     plain = [label_of(arrow, {}) for arrow in picture.arrows]
     longest = max(map(len, plain), default=0) + 8 * bool(rates)
     gap = min(_WIDEST_GAP, max(_NARROWEST_GAP, longest * _LETTER + 24))
@@ -69,8 +81,10 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
         '<path class="tip" d="M0 0L8 4L0 8z"/></marker></defs>',
         *_groups(layout),
         *(
-            _arrow(arrow, path, label)
-            for arrow, path, label in zip(picture.arrows, layout.paths, labels, strict=True)
+            _arrow(arrow, path, label, number)
+            for number, (arrow, path, label) in enumerate(
+                zip(picture.arrows, layout.paths, labels, strict=True)
+            )
         ),
         *(_box(place, chosen) for place in layout.places.values()),
         "</svg>",
@@ -93,20 +107,18 @@ def _box(place: Place, chosen: str) -> str:
     )
 
 
-def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], label: str) -> str:
+def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], label: str, number: int) -> str:
     (x, y), *rest = path
     drawn = f"M{x:.1f} {y:.1f}"
     for right, down in rest:
         middle = (x + right) / 2
         drawn += f"C{middle:.1f} {y:.1f} {middle:.1f} {down:.1f} {right:.1f} {down:.1f}"
         x, y = right, down
-    text = ""
-    if label:
-        (left, up), (right, down) = path[0], path[1]
-        text = (
-            f'<text text-anchor="middle" x="{(left + right) / 2:.1f}"'
-            f' y="{(up + down) / 2 - 4:.1f}">{escape(label)}</text>'
-        )
+    (left, up), (right, down) = path[0], path[1]
+    text = (
+        f'<text data-arrow="{number}" text-anchor="middle" x="{(left + right) / 2:.1f}"'
+        f' y="{(up + down) / 2 - 4:.1f}">{escape(label)}</text>'
+    )
     title = escape(", ".join(arrow.topics))
     return (
         f'<g class="arrow"><title>{title}</title><path d="{drawn}" marker-end="url(#tip)"/>'

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 
 import msgspec
 
@@ -83,6 +84,7 @@ class _Vertex:
         return _BEND_GAP if self.box is None else _BETWEEN_ROWS
 
 
+@lru_cache(maxsize=4)
 def lay_out(picture: Picture, gap: float = 64.0) -> Layout:
     """Return the layout of a picture.
 

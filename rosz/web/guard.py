@@ -28,7 +28,8 @@ _App: TypeAlias = Callable[[Scope, Receive, Send], Awaitable[None]]
 _COOKIE = "rosz-page"
 _LOGIN = "/login"
 _MOST_BYTES = 4096
-_REFUSED, _UNKNOWN, _SEE_OTHER = 403, 401, 303
+_REFUSED, _UNKNOWN, _SEE_OTHER, _FULL = 403, 401, 303, 503
+_TOO_MANY = "{} pages are open, which is the limit; close some, and load this one again."
 _POLICY = 1008
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>rosz</title>
 <meta name="viewport" content="width=device-width, initial-scale=1"><style>
@@ -51,16 +52,26 @@ class Guard:
         password: The password; empty if none is needed.
         local: Whether the page is served at loopback addresses only.
         secure: Whether it is served with TLS.
+        most: Largest number of pages that are open at a time.
     """
 
-    def __init__(self, password: str = "", *, local: bool = True, secure: bool = False) -> None:
+    def __init__(
+        self, password: str = "", *, local: bool = True, secure: bool = False, most: int = 200
+    ) -> None:
+        self._most = most
         self._password = password
         self._local = local
         self._cookie = secrets.token_urlsafe(24)
         self._secure = secure
 
-    def protect(self, app: _App) -> _App:
-        """Return an ASGI application that lets only welcome requests through to another one."""
+    def protect(self, app: _App, pages: Callable[[str], int] = lambda _path: 0) -> _App:
+        """Return an ASGI application that lets only welcome requests through to another one.
+
+        Args:
+            app: The other one.
+            pages: Function that returns the number of open pages if a path is that of a page,
+                else 0.
+        """
 
         async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
             if scope["type"] not in {"http", "websocket"}:
@@ -71,10 +82,12 @@ class Guard:
             }
             if fault := self._objection(headers):
                 await _refuse(scope, send, _REFUSED, f"<p>{html.escape(fault)}</p>")
-            elif self._is_known(headers):
-                await app(scope, receive, send)
-            else:
+            elif not self._is_known(headers):
                 await self._admit(scope, receive, send)
+            elif scope["type"] == "http" and pages(scope["path"]) >= self._most:
+                await _refuse(scope, send, _FULL, f"<p>{_TOO_MANY.format(self._most)}</p>")
+            else:
+                await app(scope, receive, send)
 
         return guarded
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import ui
+from nicegui import Client, ui
 
 from rosz.errors import TransportError
 from rosz.web.guard import Guard
@@ -93,7 +93,7 @@ class PageServer:
             show_welcome_message=False,
         )
         config = uvicorn.Config(
-            guard.protect(app),
+            guard.protect(app, _open_pages),
             log_level="warning",
             ws="websockets-sansio",
             timeout_graceful_shutdown=_STOP_SECONDS,
@@ -118,6 +118,11 @@ class PageServer:
         self._server.should_exit = True
         self._worker.close()
         self._socket.close()
+
+
+def _open_pages(path: str) -> int:
+    """Return the number of open pages if a path is that of a page, else 0."""
+    return len(Client.instances) if path in Client.page_routes.values() else 0
 
 
 _ICON = (

@@ -8,7 +8,14 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from rosz.diagram import PictureOptions, make_picture, write_dot, write_mermaid, write_svg
+from rosz.diagram import (
+    PictureOptions,
+    labels_of,
+    make_picture,
+    write_dot,
+    write_mermaid,
+    write_svg,
+)
 from rosz.diagram.layers import lay_out
 from rosz.errors import UsageError
 from rosz.wire import Kind, Token
@@ -148,6 +155,10 @@ def test_pictures_are_written_in_each_language() -> None:
         "node:/c&d",
         "topic:/x<y",
     }
+    labels = {one.get("data-arrow"): one.text or "" for one in root.iter() if one.get("data-arrow")}
+    numbered = enumerate(labels_of(picture, {"/x<y": "3 Hz"}))
+    assert labels == {str(number): text for number, text in numbered}
+    assert "3 Hz" in labels.values()
     assert '"node:/a\\"b" -> "topic:/x<y";' in write_dot(picture)
     assert 'n0(["/a#quot;b"])' in write_mermaid(picture)
     empty = make_picture([], PictureOptions())

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from typing import get_args
+import json
+import time
+from typing import NamedTuple, get_args
 from urllib.parse import urlencode
 
 import msgspec
-from nicegui import ui
+from nicegui import background_tasks, run, ui
 from nicegui.events import GenericEventArguments
 
-from rosz.diagram import Content, Picture, PictureOptions, make_picture, write_dot, write_svg
+from rosz.diagram import (
+    Content,
+    Picture,
+    PictureOptions,
+    labels_of,
+    make_picture,
+    write_dot,
+    write_svg,
+)
 from rosz.errors import RoszError
 from rosz.introspect.nodes import find_nodes, format_node
 from rosz.introspect.survey import Survey
@@ -19,7 +29,8 @@ from rosz.web.pages.layout import Frame, address_of, empty_state, short_rate_tex
 
 __all__ = ("show_graph",)
 
-_PERIOD = 1.0
+_PERIOD = 0.25
+_RATES_PERIOD = 1.0
 _CONTENTS = {"nodes": "Nodes only", "active": "Nodes and topics", "all": "All topics"}
 _SWITCHES = {
     "hide_debug": "Hide /rosout, /clock and tools",
@@ -32,6 +43,14 @@ _SWITCHES = {
 _PICK = """(event) => {
   const box = event.target.closest('[data-key]');
   if (box && (event.type === 'click' || event.key === 'Enter')) emit(box.dataset.key);
+}"""
+
+_RELABEL = """(labels) => {
+  const drawn = document.querySelector('.rosz-graph');
+  for (const [number, text] of Object.entries(labels)) {
+    const label = drawn?.querySelector(`[data-arrow="${number}"]`);
+    if (label) label.textContent = text;
+  }
 }"""
 
 
@@ -53,6 +72,20 @@ def show_graph(system: System, content: str, nodes: str, topics: str, group: int
     _Graph(system, options)
 
 
+class _Shown(NamedTuple):
+    """What is drawn.
+
+    Args:
+        picture: Boxes and arrows.
+        rated: Whether arrows have rates.
+        chosen: Key of the box that is emphasised.
+    """
+
+    picture: Picture
+    rated: bool
+    chosen: str
+
+
 class _Graph:
     """The picture with its choices.
 
@@ -67,7 +100,11 @@ class _Graph:
         self._system = system
         self._watch = frame.use(system.graph)
         self._traffic: Traffic = frame.use(system.traffic)
-        self._shown: object = None
+        self._wanted: object = None
+        self._due = 0.0
+        self._shown: _Shown | None = None
+        self._drawn = False
+        self._labels: dict[int, str] = {}
         self._picture = Picture()
         self._chosen = ""
         self._zoom = 100
@@ -172,18 +209,37 @@ class _Graph:
         self._drawing.style(f"zoom: {self._zoom / 100}")
 
     def _refresh(self) -> None:
-        survey = self._watch.survey()
-        self._traffic.update(survey)
-        tokens = [t for t in survey.view.tokens if t.node_name != self._system.node.name]
-        self._picture = make_picture(tokens, self._options)
-        shown = (self._picture, self._flows() if self._rates else {}, self._chosen)
-        if shown == self._shown:
+        """Draw what has changed; the rates on the arrows change once a second."""
+        survey, now = self._watch.survey(), time.monotonic()
+        wanted = survey, self._options, self._chosen, self._rates
+        if wanted == self._wanted and now < self._due:
             return
-        self._shown = shown
-        drawn = bool(self._picture.boxes)
-        self._empty.set_visibility(not drawn and self._watch.complete)
-        self._card.set_visibility(drawn)
-        self._drawing.set_content(write_svg(*shown) if drawn else "")
+        self._traffic.update(survey)
+        if wanted != self._wanted:
+            tokens = [t for t in survey.view.tokens if t.node_name != self._system.node.name]
+            self._picture = make_picture(tokens, self._options)
+        self._wanted, self._due = wanted, now + _RATES_PERIOD
+        self._empty.set_visibility(not self._picture.boxes and self._watch.complete)
+        self._card.set_visibility(bool(self._picture.boxes))
+        flows = self._flows() if self._rates else {}
+        shown = _Shown(self._picture, bool(flows), self._chosen)
+        if shown != self._shown:
+            self._shown = shown
+            background_tasks.create(self._draw(shown, flows))
+        elif not self._drawn:
+            return
+        elif changed := _changes(self._labels, labels_of(self._picture, flows)):
+            self._labels.update(changed)
+            ui.run_javascript(f"({_RELABEL})({json.dumps(changed)})")
+
+    async def _draw(self, shown: _Shown, flows: dict[str, str]) -> None:
+        """Draw on another thread, as the layout of a large picture takes a while."""
+        self._drawn = False
+        text = await run.io_bound(write_svg, shown.picture, flows, shown.chosen)
+        if text is not None and shown is self._shown and not self._drawing.is_deleted:
+            self._labels = dict(enumerate(labels_of(shown.picture, flows)))
+            self._drawing.set_content(text if shown.picture.boxes else "")
+            self._drawn = True
 
     def _flows(self) -> dict[str, str]:
         found = {}
@@ -208,6 +264,10 @@ class _Graph:
                     ui.link("Open the topic", f"/topics?{urlencode({'topic': name}, safe='/')}")
                 ui.button("Close", on_click=dialog.close).props("flat no-caps")
         self._refresh()
+
+
+def _changes(before: dict[int, str], labels: list[str]) -> dict[int, str]:
+    return {number: text for number, text in enumerate(labels) if before.get(number) != text}
 
 
 def _describe(survey: Survey, kind: str, name: str) -> str:

@@ -1,0 +1,124 @@
+"""Visitors who are too many, who sleep, or who may not come: others are not affected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from urllib.error import HTTPError
+
+import pytest
+from network import TIMEOUT, Network, Program, eventually
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Origin
+
+from rosz.msgs.std_srvs.srv import Empty
+
+from .visitor import Visitor
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
+LONG = 4 * TIMEOUT
+
+
+SERVER = """
+import sys, threading
+from rosz.node import Node
+from rosz.web.guard import Guard
+from rosz.web.model import Permission
+from rosz.web.server import PageServer
+with Node("web") as node:
+    server = PageServer(node, "127.0.0.1", 0, permission=Permission(None, False),
+        guard=Guard(sys.argv[1], most=int(sys.argv[2])))
+    print("the page is at", server.port, flush=True)
+    sys.stdin.readline()
+    server.close()
+"""
+MOST = 5
+
+
+class Pages:
+    """A server of few pages, and a node that they show."""
+
+    def __init__(self, network: Network, password: str = "") -> None:
+        self.network = network
+        self.node = network.node("robot")
+        self.server: Program = network.program(SERVER, password, str(MOST))
+        self.port = int(self.server.wait_for("the page is at", LONG).split()[-1])
+        self.address = f"http://127.0.0.1:{self.port}"
+
+    def observed(self) -> bool:
+        """Return whether a page observes the log."""
+        view = self.node.context.graph.view()
+        return any(token.node_name == "/web" for token in view.subscriptions("/rosout"))
+
+
+@pytest.fixture(scope="module")
+def pages() -> Iterator[Pages]:
+    pytest.importorskip("nicegui")
+    network = Network()
+    try:
+        yield Pages(network)
+    finally:
+        network.close()
+
+
+def refusal(address: str) -> tuple[int, str]:
+    """Return the status and the text with which a visitor is refused."""
+    with pytest.raises(HTTPError) as caught:
+        Visitor(address)
+    with caught.value as error:
+        return error.code, error.read().decode()
+
+
+def test_too_many(pages: Pages) -> None:
+    """Beyond the limit pages are refused in words, and those that are open go on."""
+    visitors = [Visitor(pages.address, "/graph") for _ in range(MOST)]
+    status, text = refusal(pages.address)
+    assert status == 503
+    assert f"{MOST} pages are open, which is the limit" in text
+    pages.network.node("newcomer")
+    for one in visitors:
+        one.wait_for("newcomer")
+        one.close()
+
+    def opens() -> bool:
+        try:
+            Visitor(pages.address).close()
+        except HTTPError:
+            return False
+        return True
+
+    eventually(opens, "room for a page", LONG)
+
+
+def test_one_that_sleeps(pages: Pages) -> None:
+    """A page whose browser reads nothing is closed, with what it observes; another one goes on."""
+    asleep = Visitor(pages.address, "/console", awake=False)
+    eventually(pages.observed, "the page to observe the log", LONG)
+    awake = Visitor(pages.address, "/services")
+    eventually(lambda: not pages.observed(), "the end of the page that sleeps", LONG)
+    pages.node.service("late", Empty, lambda _: Empty.Response())
+    awake.wait_for("/late")
+    awake.close()
+    asleep.close()
+
+
+def test_foreign_pages_and_garbage(pages: Pages) -> None:
+    """A websocket of another origin is refused; frames that are no messages end theirs alone."""
+    one = Visitor(pages.address, "/graph")
+    place = f"ws://127.0.0.1:{pages.port}/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    with pytest.raises(InvalidStatus, match="403"), connect(place, origin=Origin("http://evil")):
+        pass
+    garbage = ("x" * 1000, b"\x00" * 1000, '42["event",{"client_id":"none"}]', '42["handshake",5]')
+    for data in garbage:
+        with connect(place, open_timeout=LONG, max_size=None) as link:
+            link.recv(timeout=LONG)
+            link.send("40")
+            link.send(data)
+    with connect(place, open_timeout=LONG) as link:
+        link.recv(timeout=LONG)
+        link.socket.sendall(b"\x82\xff" + (1 << 30).to_bytes(8, "big") + bytes(4))
+        with pytest.raises(ConnectionClosed, match="1009"):
+            list(link)
+    pages.network.node("third")
+    one.wait_for("third")
+    one.close()
