@@ -8,7 +8,7 @@ below them.
 """
 
 from rosz.actions.client import ActionClient, ClientGoal, CommState
-from rosz.actions.gateway import ActionGateway
+from rosz.actions.gateway import ActionGateway, ServiceGateway
 from rosz.actions.server import ActionServer, ServerGoal
 from rosz.actions.simple_server import SimpleActionServer
 from rosz.actions.types import ActionTypes
@@ -21,5 +21,6 @@ __all__ = (
     "ClientGoal",
     "CommState",
     "ServerGoal",
+    "ServiceGateway",
     "SimpleActionServer",
 )

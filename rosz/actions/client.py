@@ -208,6 +208,7 @@ class ActionClient:
         node: Node that the client belongs to.
         name: Name of the action; resolved and remapped.
         action_type: Class of the action, such as ``FibonacciAction``.
+        has_ros2: Whether it reaches servers that have ROS 2's protocol only.
 
     Attributes:
         node: Node that the client belongs to.
@@ -217,13 +218,15 @@ class ActionClient:
         UsageError: The class is not that of an action.
     """
 
-    def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
+    def __init__(
+        self, node: Node, name: str, action_type: type[Any], *, has_ros2: bool = True
+    ) -> None:
         self._types = types = ActionTypes.of(action_type, node.context.types)
         self.node: Node = node
         self.name: str = node.resolve(name)
         self._goals: dict[str, ClientGoal] = {}
         self._ros2: Ros2Client | None = None
-        if types.action is not None:
+        if types.action is not None and has_ros2:
             self._ros2 = Ros2Client(node, self.name, types, types.action)
         self._served = False
         self._watch = node.keep(

@@ -1,17 +1,28 @@
-"""Servers of ROS 2 for programs that speak actionlib by its topics alone, such as web pages."""
+"""Goals of programs that know one protocol only, for servers that know only the other one.
+
+Web pages and actionlib's programs in C++ have its topics alone, servers of ROS 2 services alone.
+"""
 
 from __future__ import annotations
 
+import threading
+from functools import partial
 from typing import Any
 
+from rosz.actions.client import ActionClient, ClientGoal
 from rosz.actions.ros2_client import Ros2Client
+from rosz.actions.ros2_server import Ros2Server
 from rosz.actions.server import ActionServer, ServerGoal
-from rosz.actions.types import ActionTypes
+from rosz.actions.types import RUNNING, ActionTypes
 from rosz.errors import UsageError
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
 from rosz.node import Node
+from rosz.node.action_server import ServerGoal as NativeGoal
 
-__all__ = ("ActionGateway",)
+__all__ = ("ActionGateway", "ServiceGateway")
+
+
+_ENDED = "the gateway to the server ended"
 
 
 class ActionGateway:
@@ -44,7 +55,9 @@ class ActionGateway:
         return served
 
     def close(self) -> None:
-        """Receive no goals any more; those that have not ended are left to their server."""
+        """Receive no goals any more; clients take those that have not ended for aborted."""
+        for goal in list(self._goals.values()):
+            goal.finish(GoalStatus(goal.id, GoalStatus.LOST, _ENDED), None)
         self._server.stop()
         self._client.close()
 
@@ -92,3 +105,93 @@ class _Goal:
             goal.cancel(result, status.text)
         else:
             goal.abort(result, status.text)
+
+
+class ServiceGateway:
+    """Receive goals by ROS 2's services, and hand them to a server that has actionlib's topics.
+
+    Args:
+        node: Node that has the services.
+        name: Full name of the action.
+        action_type: Class of the action, such as ``FibonacciAction``.
+
+    Raises:
+        UsageError: The class is not that of an action, or the action's definition is not found.
+    """
+
+    def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
+        types = ActionTypes.of(action_type, node.context.types)
+        if types.action is None:
+            raise UsageError(f"the definition of {action_type._type} is not found")
+        self._types, self._action = types, types.action
+        self._client = ActionClient(node, name, action_type, has_ros2=False)
+        self._lock = threading.Lock()
+        self._goals: dict[str, ClientGoal] = {}
+        self._server: Ros2Server | None = None
+
+    def start(self) -> bool:
+        """Begin to receive goals; return true."""
+        client = self._client
+        self._server = client.node.keep(
+            _Services(
+                client.node, client.name, self._types, self._action, self._receive, self._cancel
+            )
+        )
+        return True
+
+    def close(self) -> None:
+        """Receive no goals any more; clients learn that the server has ended."""
+        if self._server is not None:
+            self._server.close()
+        self._client.stop()
+
+    def _receive(self, message: Any) -> None:
+        name = message.goal_id.id
+        with self._lock:  # a cancellation comes after its goal
+            self._goals[name] = self._client.send(
+                message.goal,
+                on_done=partial(self._finish, name),
+                on_feedback=partial(self._send_feedback, name),
+                on_transition=partial(self._follow, name),
+            )
+
+    def _cancel(self, goal_id: GoalID) -> None:
+        if not goal_id.id:
+            self._client.publish_cancel(goal_id)
+            return
+        with self._lock:
+            goal = self._goals.get(goal_id.id)
+        if goal is not None:
+            goal.cancel()
+
+    def _send_feedback(self, name: str, feedback: Any) -> None:
+        if self._server is not None:
+            self._server.send_feedback(name, feedback)
+
+    def _follow(self, name: str, goal: ClientGoal) -> None:
+        """Pass on a state that is not the end of the goal."""
+        if goal.status.status in RUNNING | {GoalStatus.RECALLING}:
+            self._update(name, goal.status.status, None)
+
+    def _finish(self, name: str, goal: ClientGoal) -> None:
+        """Pass on the end of the goal."""
+        lost = goal.status.status == GoalStatus.LOST
+        self._update(name, GoalStatus.ABORTED if lost else goal.status.status, goal.result)
+        with self._lock:
+            self._goals.pop(name, None)
+
+    def _update(self, name: str, status: int, result: Any) -> None:
+        if self._server is not None:
+            self._server.update(GoalStatus(GoalID(id=name), status), result)
+
+
+class _Services(Ros2Server):
+    """Hands goals to a server elsewhere, which decides about them when they are accepted."""
+
+    def accepts(self, goal: NativeGoal) -> bool:
+        """Return whether the goal has not ended, as is so for a new one."""
+        return not goal.done
+
+    def start(self, goal: NativeGoal) -> None:
+        """Hand an accepted goal to the server."""
+        self.hand_over(goal)

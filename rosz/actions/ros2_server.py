@@ -63,11 +63,15 @@ class Ros2Server(NativeServer):
 
     def accepts(self, goal: NativeGoal) -> bool:
         """Hand a goal to the server; return whether that has not rejected it at once."""
+        self.hand_over(goal)
+        return str(goal.id) in self._mirrored or goal.done
+
+    def hand_over(self, goal: NativeGoal) -> None:
+        """Hand a goal to the server."""
         name, types, stamp = str(goal.id), self._types, Time.from_nsec(goal.accepted)
         self._mirrored[name] = goal
         request = translate(goal.request, types.goal)
         self._receive_goal(types.action_goal(Header(stamp=stamp), GoalID(stamp, name), request))
-        return name in self._mirrored or goal.done
 
     def start(self, goal: NativeGoal) -> None:
         """Do nothing: the server executes the goal."""

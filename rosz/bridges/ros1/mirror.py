@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
 
+from rosz.bridges.ros1.actions import Actions
 from rosz.bridges.ros1.frames import encode_header
 from rosz.bridges.ros1.registry import ANY_TYPE, Change, Entry, Role
 from rosz.bridges.ros1.server import Incoming
@@ -76,6 +77,7 @@ class Mirror:
         self._published = published
         self._own = own
         self._clients = Clients(own, shared)
+        self._actions = Actions(shared)
         self._calls: Worker[Callable[[], object]] = Worker(
             "rosz-ros1-services", threads=_CALLS, capacity=_MAX_CALLS, logger=log
         )
@@ -108,6 +110,7 @@ class Mirror:
     def close(self) -> None:
         """Take everything from the network."""
         self._calls.close(0)
+        self._actions.close()
         self._shared.changes.submit(self._close)
         self._shared.changes.flush(_CLOSE_TIMEOUT)
 
@@ -124,6 +127,7 @@ class Mirror:
                     self._add(change.entry)
                 else:
                     self._remove(change.entry)
+                self._actions.change(change.entry, alive=change.alive)
             except ClosedError:
                 return
             except (InvalidName, UsageError) as error:
@@ -192,6 +196,7 @@ class Mirror:
             for part in list(self._by_name.get(name, ())):
                 part.update()
             self._clients.update(name)
+            self._actions.update(name)
             if is_published:
                 # Not only for the first and the last: a subscriber may have registered in between.
                 self._published(name)

@@ -12,13 +12,15 @@ import pytest
 from network import TIMEOUT, Program, eventually, repeats
 
 from rosz.actions import ActionClient, ClientGoal
-from rosz.errors import RoszError
+from rosz.errors import ActionError, GoalFailed, RoszError
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
+from rosz.node.action_server import ServerGoal
+from rosz.node.goals import GoalState
 from rosz.reconfigure import Client
 from rosz.transforms import (
     Buffer,
@@ -165,6 +167,62 @@ def test_goals_for_a_roscpp_server(world: World, robot: Start) -> None:
         assert _ended(_send(client, -1)[0]) == (GoalStatus.ABORTED, "negative")
     received = sum(line.startswith("goal") for line in server.lines)
     assert received == repeats(3, 20) + 3  # each once
+
+
+def test_goals_of_roscpp_clients_for_a_server_of_ros2(robot: Start, node: Node) -> None:
+    count = node.context.types.action("actionlib/Test")
+    executed: list[int] = []
+
+    def execute(goal: ServerGoal) -> None:
+        executed.append(goal.request.goal)
+        goal.feedback(count.Feedback(1))
+        if goal.request.goal < 0:
+            goal.abort(count.Result(-1))
+        elif goal.request.goal == int(ENDLESS):
+            while not goal.wait_for_cancel(TIMEOUT):
+                pass
+            goal.canceled(count.Result(7))
+        else:
+            goal.succeed(count.Result(goal.request.goal))
+
+    early = robot("goal", "3")  # which waits for a server
+    server = node.action_server("count", count, execute)
+    early.wait_for("SUCCEEDED 3")
+    assert early.exit_code() == 0
+    robot("goal", "-1").wait_for("ABORTED -1")
+    robot("goal", ENDLESS, "cancel").wait_for("PREEMPTED 7")
+    two = [robot("goal", ENDLESS), robot("goal", ENDLESS, "cancel")]
+    two[0].wait_for("feedback")
+    two[1].wait_for("PREEMPTED 7")
+    assert two[0].process.poll() is None
+    server.close()
+    two[0].wait_for(re.compile("ABORTED|server lost"))
+    assert executed == [3, -1, *[int(ENDLESS)] * 3]  # each once
+
+
+def test_goals_of_ros2_clients_for_a_roscpp_server(robot: Start, node: Node) -> None:
+    count = node.context.types.action("actionlib/Test")
+    client = node.action_client("count", count)
+    server = robot("goals")
+    client.wait_for_server(TIMEOUT)
+    goal = client.send(count.Goal(3), timeout=TIMEOUT)
+    assert goal.result(TIMEOUT).result == 3
+    with pytest.raises(GoalFailed) as failed:
+        client.send(count.Goal(-1), timeout=TIMEOUT).result(TIMEOUT)
+    assert (failed.value.status, failed.value.result.result) == (GoalState.ABORTED, -1)
+    goal = client.send(count.Goal(int(ENDLESS)), timeout=TIMEOUT)
+    assert next(iter(goal)).feedback == 0
+    assert goal.cancel(TIMEOUT)
+    assert goal.wait(TIMEOUT) is GoalState.CANCELED
+    replaced = client.send(count.Goal(int(ENDLESS)), timeout=TIMEOUT)
+    assert next(iter(replaced)).feedback == 0
+    last = client.send(count.Goal(int(ENDLESS)), timeout=TIMEOUT)
+    assert replaced.wait(TIMEOUT) is GoalState.CANCELED
+    assert next(iter(last)).feedback == 0
+    server.kill()
+    with pytest.raises(ActionError):
+        last.result(TIMEOUT)
+    assert sum(line.startswith("goal") for line in server.lines) == 5  # each once
 
 
 def test_settings_of_a_roscpp_node(robot: Start, node: Node) -> None:
