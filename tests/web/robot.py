@@ -20,8 +20,9 @@ ROBOT = """
 import math
 import rosz
 from rosz.msgs.example_interfaces.action import Fibonacci
-from rosz.msgs.geometry_msgs.msg import Twist
-from rosz.msgs.sensor_msgs.msg import Image
+from rosz.msgs.geometry_msgs.msg import Pose, PoseWithCovariance, Quaternion, Twist
+from rosz.msgs.nav_msgs.msg import Odometry
+from rosz.msgs.sensor_msgs.msg import Image, LaserScan
 from rosz.msgs.std_msgs.msg import Float64, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.reconfigure import Choice, Description, Group, Server, Setting, enumeration
@@ -69,6 +70,8 @@ with rosz.Node("robot") as node:
     node.params.set("~gains", {"p": 1.5, "names": ["a", "b"], "on": True})
     node.params.watch("~rate", lambda change: print("rate is", change.new, flush=True))
     camera = node.publisher("camera", Image)
+    odometry = node.publisher("odom", Odometry)
+    scan = node.publisher("scan", LaserScan)
     server = Server(node, SETTINGS, reconfigured)
     node.timer(1.0, lambda event: node.log.warning("the battery is low"))
     print("ready", flush=True)
@@ -76,6 +79,10 @@ with rosz.Node("robot") as node:
         chatter.publish(String(data=f"hello {tick}"))
         if tick % 4 == 0:
             rows = bytes((x * 3 + tick) % 256 for x in range(80)) * 60
+            odometry.publish(Odometry(pose=PoseWithCovariance(pose=Pose(orientation=Quaternion(w=1)))))
+            scan.publish(
+                LaserScan(angle_increment=0.1, range_max=9.0, ranges=[2 + x % 3 for x in range(60)])
+            )
             camera.publish(Image(height=60, width=80, encoding="mono8", step=80, data=rows))
         wave.publish(Float64(data=math.sin(tick / 10)))
 """

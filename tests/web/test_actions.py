@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any
 
@@ -18,11 +19,13 @@ from rosz.msgs.geometry_msgs.msg import (
     Twist,
     Vector3,
 )
+from rosz.msgs.nav_msgs.msg import Odometry
 from rosz.msgs.sensor_msgs.msg import BatteryState, Image
 from rosz.msgs.std_msgs.msg import Float64MultiArray, Header, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.web.model import (
     Driver,
+    FloorPlan,
     Form,
     ImageWatch,
     LogBook,
@@ -33,10 +36,12 @@ from rosz.web.model import (
     System,
     TopicWatch,
     call_service,
+    find_floor,
     form_of,
     message_tree,
     split_fields,
 )
+from rosz.web.model.floor import Surroundings, draw_floor
 from rosz.web.model.forms import FormField, form_fields, read_form
 from rosz.web.model.plotting import Series, plottable_fields
 
@@ -372,3 +377,41 @@ def test_the_log_is_bounded_and_filtered(network: Network) -> None:
     book.clear()
     assert texts() == []
     book.close()
+
+
+def test_a_robot_is_drawn_from_above() -> None:
+    seen = Surroundings()
+    assert draw_floor(seen) == ""
+    seen.see(0.0, 0.1, [1.0], 3.5)
+    assert seen.beams == []
+    seen.move(1.0, 2.0, math.pi / 2)
+    seen.move(math.nan, 0.0, 0.0)
+    seen.see(0.0, math.pi / 2, [1.0, 2.0, math.inf, math.nan, 0.0], 3.5)
+    assert [(round(x, 9), round(y, 9)) for x, y in seen.beams] == [(1.0, 3.0), (-1.0, 2.0)]
+    picture = draw_floor(seen)
+    assert '<circle cx="1.000" cy="-2.000"' in picture
+    assert "M1.00 -3.00h0" in picture
+    for number in range(400):
+        seen.move(number * 10.0, 0.0, 0.0)
+        seen.see(0.0, 0.3, [1.0] * 20, 3.5)
+    assert len(seen.cells) == 3000
+
+
+def test_a_robot_is_found_beside_its_velocities(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    odometry = robot.publisher("tb3/odom", Odometry)
+    robot.publisher("tb3/scan", String)
+    graph = System(page, Permission()).graph.use().value
+    eventually(lambda: graph.survey().view.publishers("/tb3/scan"), "the publishers")
+    eventually(lambda: graph.survey().view.publishers("/tb3/odom"), "the publishers")
+    assert find_floor(graph.survey(), "/cmd_vel") == {}
+    topics = find_floor(graph.survey(), "/tb3/cmd_vel")
+    assert topics == {"odom": "/tb3/odom"}
+    floor = FloorPlan(page, Permission(), topics)
+
+    def is_drawn() -> bool:
+        odometry.publish(Odometry())
+        return "circle" in floor.picture()
+
+    eventually(is_drawn, "the robot")
+    floor.close()

@@ -130,6 +130,15 @@ def test_a_key_drives_as_long_as_it_is_held(world: World) -> None:
     keys.key_up(Keys.ARROW_UP).perform()
     world.robot.wait_for("drives 0.0", LONG)
     world.should_see("It stands.")
+    world.browser.execute_script(
+        "window.stick = [0, -0.5];navigator.getGamepads = () => [null, {axes: window.stick}];"
+    )
+    world.robot.wait_for("drives 0.5", LONG)
+    world.browser.execute_script("window.stick = [0, 0.01]")
+    world.should_see("It stands.")
+    world.should_see("From above", "by /odom and /scan")
+    shown = "return document.querySelector('[aria-label=\"robot from above\"] circle') !== null"
+    eventually(lambda: world.browser.execute_script(shown), "the robot from above", LONG)
     assert world.messages() == []
 
 

@@ -9,6 +9,7 @@ from rosz.web.model.calling import call_service, service_type
 from rosz.web.model.console import LogBook
 from rosz.web.model.driving import Driver
 from rosz.web.model.findings import Findings
+from rosz.web.model.floor import FloorPlan, find_floor
 from rosz.web.model.forms import Form, FormField, form_of
 from rosz.web.model.frames import Frames, read_frame
 from rosz.web.model.launches import Launches, NodeOutput, RunningLaunch
@@ -30,6 +31,7 @@ __all__ = (
     "Actions",
     "Driver",
     "Findings",
+    "FloorPlan",
     "Form",
     "FormField",
     "Frames",
@@ -51,6 +53,7 @@ __all__ = (
     "TopicWatch",
     "Traffic",
     "call_service",
+    "find_floor",
     "form_of",
     "message_tree",
     "read_frame",

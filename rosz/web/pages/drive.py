@@ -1,22 +1,23 @@
-"""Driving by hand: keys, a pad, and the picture of a turtlesim."""
+"""Driving by hand: keys, a pad or a gamepad, with pictures of a turtlesim or a robot."""
 
 from __future__ import annotations
 
 from urllib.parse import urlencode
 
 from nicegui import ui
-from nicegui.events import JoystickEventArguments, KeyEventArguments
+from nicegui.events import GenericEventArguments, JoystickEventArguments, KeyEventArguments
 
 from rosz.errors import RoszError
 from rosz.introspect.topics import list_topics
 from rosz.turtlesim import fetch
-from rosz.web.model import Driver, System
+from rosz.web.model import Driver, FloorPlan, System, find_floor
 from rosz.web.pages.layout import Frame, address_of
 
 __all__ = ("show_drive",)
 
 _LIST_PERIOD = 1.0
 _PICTURE_PERIOD = 0.1
+_FLOOR_PERIOD = 0.2
 _TWIST = "geometry_msgs/Twist"
 _KEYS = {
     "ArrowUp": (1, 0),
@@ -34,6 +35,15 @@ if (!window.roszDrives) {
   for (const name of ['blur', 'pagehide']) {
     window.addEventListener(name, () => emitEvent('rosz-release'));
   }
+  let moved = false;
+  setInterval(() => {
+    const pad = navigator.getGamepads().find((one) => one !== null && one.axes.length >= 2);
+    if (!pad) return;
+    const stick = [pad.axes[0], pad.axes[1]].map((one) => Math.abs(one) < 0.12 ? 0 : one);
+    const moves = stick.some((one) => one !== 0);
+    if (moves || moved) emitEvent('rosz-gamepad', stick);
+    moved = moves;
+  }, 50);
 }"""
 
 
@@ -58,6 +68,7 @@ class _Drive:
         self._held: set[str] = set()
         self._picture = system.pictures.add(self._take)
         self._number = 0
+        self._floor: FloorPlan | None = None
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-4 px-3 py-2"):
                 self._select = (
@@ -78,22 +89,30 @@ class _Drive:
                 self._rate.classes("w-20")
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
                 self._add_pad()
+                with ui.column().classes("rosz-card p-4 gap-2 min-w-0") as self._floor_card:
+                    ui.label("From above").classes("text-base font-semibold")
+                    self._floor_text = ui.label("").classes("rosz-soft text-sm")
+                    self._floor_picture = ui.html("", sanitize=False).classes("w-full")
                 with ui.column().classes("rosz-card p-4 gap-2 min-w-0") as self._card:
                     ui.label("turtlesim").classes("text-base font-semibold")
                     self._image = ui.interactive_image().classes("w-full")
         ui.keyboard(on_key=self._key, repeating=False)
         ui.on("rosz-alive", self._live)
         ui.on("rosz-release", self._release)
+        ui.on("rosz-gamepad", self._tilt)
         ui.run_javascript(_HEARTBEAT)
         frame.keep(self)
         frame.every(_LIST_PERIOD, self._list)
         if topic:
             self._choose()
         ui.timer(_PICTURE_PERIOD, self._show_picture)
+        frame.every(_FLOOR_PERIOD, self._show_floor)
 
     def _add_pad(self) -> None:
         with ui.column().classes("rosz-card p-4 gap-2 items-center min-w-0"):
-            ui.label("Pull the pad, or hold the arrow keys or W, A, S, D.").classes("rosz-soft")
+            ui.label(
+                "Pull the pad, hold the arrow keys or W, A, S, D, or tilt the stick of a gamepad."
+            ).classes("rosz-soft text-center")
             ui.joystick(
                 color="#2456c8",
                 size=120,
@@ -107,9 +126,15 @@ class _Drive:
     def close(self) -> None:
         """Stop driving."""
         self._system.pictures.remove(self._picture)
+        self._close_floor()
         driver, self._driver = self._driver, None
         if driver is not None:
             driver.close()
+
+    def _close_floor(self) -> None:
+        floor, self._floor = self._floor, None
+        if floor is not None:
+            floor.close()
 
     def _list(self) -> None:
         survey = self._graph.survey()
@@ -126,6 +151,22 @@ class _Drive:
             self._select.set_value(options[0])
         turtles = any("turtlesim/srv/Spawn" in types for types in survey.view.services().values())
         self._card.set_visibility(turtles)
+        self._open_floor(find_floor(survey, str(self._select.value or "/")))
+
+    def _open_floor(self, topics: dict[str, str]) -> None:
+        """Show the robot from above if it says where it is."""
+        if "odom" not in topics:
+            self._close_floor()
+        elif self._floor is None or self._floor.topics != topics:
+            self._close_floor()
+            self._floor = FloorPlan(self._system.node, self._system.permission, topics)
+            self._floor_text.set_text(f"by {' and '.join(sorted(topics.values()))}")
+        self._floor_card.set_visibility(self._floor is not None)
+
+    def _show_floor(self) -> None:
+        picture = "" if self._floor is None else self._floor.picture()
+        if self._floor_picture.content != picture:
+            self._floor_picture.set_content(picture)
 
     def _choose(self) -> None:
         topic = str(self._select.value or "")
@@ -156,6 +197,10 @@ class _Drive:
 
     def _pull(self, event: JoystickEventArguments) -> None:
         self._go(float(event.y or 0), -float(event.x or 0))
+
+    def _tilt(self, event: GenericEventArguments) -> None:
+        right, back = event.args
+        self._go(-float(back), -float(right))
 
     def _release(self) -> None:
         self._held.clear()
