@@ -87,6 +87,90 @@ with rosz.Node("robot") as node:
         wave.publish(Float64(data=math.sin(tick / 10)))
 """
 
+SPACE = """
+import math
+import struct
+import rosz
+from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.geometry_msgs.msg import *
+from rosz.msgs.nav_msgs.msg import MapMetaData, OccupancyGrid, Path
+from rosz.msgs.sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from rosz.msgs.std_msgs.msg import ColorRGBA, Header
+from rosz.msgs.visualization_msgs.msg import Marker, MarkerArray
+from rosz.transforms import StaticTransformBroadcaster, TransformBroadcaster, from_rpy
+
+URDF = '''<robot name="r"><material name="blue"><color rgba="0.15 0.35 0.85 1"/></material>
+<link name="base_link"><visual><origin xyz="0 0 0.2"/>
+<geometry><box size="0.8 0.5 0.25"/></geometry>
+<material name="blue"/></visual><visual><origin xyz="0 0.3 0.15" rpy="1.5708 0 0"/>
+<geometry><cylinder radius="0.15" length="0.08"/></geometry></visual>
+<visual><origin xyz="0 -0.3 0.15" rpy="1.5708 0 0"/>
+<geometry><cylinder radius="0.15" length="0.08"/></geometry></visual></link>
+<link name="laser"><visual><geometry><mesh filename="package://nowhere/laser.stl"/></geometry></visual>
+</link></robot>'''
+FLAT = Quaternion(0, 0, 0, 1)
+
+
+def marker(number, kind, **fields):
+    return Marker(header=Header(frame_id="map"), ns="things", id=number, type=kind, **fields)
+
+
+with rosz.Node("robot") as node:
+    moving, fixed = TransformBroadcaster(node), StaticTransformBroadcaster(node)
+    header = Header(frame_id="base_link")
+    fixed.send(TransformStamped(header, "laser", Transform(Vector3(0.2, 0, 0.4), FLAT)))
+    node.params.set("/robot_description", URDF)
+    cells = [100 if x in (0, 99) or y in (0, 79) else 0 for y in range(80) for x in range(100)]
+    info = MapMetaData(resolution=0.1, width=100, height=80, origin=Pose(Point(-5, -4, 0), FLAT))
+    map_ = node.publisher("map", OccupancyGrid, latch=True)
+    map_.publish(OccupancyGrid(header=Header(frame_id="map"), info=info, data=cells))
+    markers = node.publisher("markers", MarkerArray, latch=True)
+    green, gold = ColorRGBA(0.1, 0.7, 0.3, 1), ColorRGBA(0.9, 0.6, 0.1, 1)
+    markers.publish(MarkerArray([
+        marker(1, Marker.CYLINDER, pose=Pose(Point(-2, 2, 0.5), FLAT), scale=Vector3(0.6, 0.6, 1),
+               color=green),
+        marker(2, Marker.TEXT_VIEW_FACING, pose=Pose(Point(-2, 2, 1.3), FLAT), text="a marker",
+               scale=Vector3(0, 0, 0.3), color=green),
+        marker(3, Marker.LINE_STRIP, pose=Pose(Point(), FLAT), scale=Vector3(0.05, 0, 0),
+               color=gold, points=[Point(-4, -3, 0), Point(-2, -3, 0.5), Point(-2, -1, 0)]),
+        marker(4, Marker.SPHERE, pose=Pose(Point(3, 2.5, 0.4), FLAT), scale=Vector3(.8, .8, .8),
+               color=ColorRGBA(0.8, 0.2, 0.2, 0.6)),
+    ]))
+    scan, path = node.publisher("scan", LaserScan), node.publisher("path", Path)
+    cloud = node.publisher("cloud", PointCloud2)
+    fields = [PointField(name, 4 * at, PointField.FLOAT32, 1) for at, name in enumerate("xyz")]
+    points = b"".join(
+        struct.pack("<3f", 1 + x / 100, 1 + y / 100, 0.6 + math.sin(x / 15) * math.cos(y / 20) / 5)
+        for x in range(320) for y in range(320)
+    )
+    goal = lambda got: print(f"goes to {got.pose.position.x:.1f} {got.pose.position.y:.1f}",
+                             got.header.frame_id, flush=True)
+    node.subscription("move_base_simple/goal", PoseStamped, goal)
+    node.subscription("initialpose", PoseWithCovarianceStamped,
+                      lambda got: print("starts at", got.pose.covariance[0], flush=True))
+    node.subscription("clicked_point", PointStamped,
+                      lambda got: print(f"point {got.point.z:.1f}", flush=True))
+    poses = []
+    print("ready", flush=True)
+    for tick in node.rate(10):
+        now, angle = Time.from_nsec(node.now()), tick / 50
+        turned = Quaternion(*from_rpy(0, 0, angle + math.pi / 2))
+        place = Point(2 * math.cos(angle), 2 * math.sin(angle), 0)
+        header = Header(stamp=now, frame_id="map")
+        moving.send(TransformStamped(header, "base_link",
+                                     Transform(Vector3(place.x, place.y, 0), turned)))
+        poses = [*poses[-300:], PoseStamped(header, Pose(place, turned))]
+        path.publish(Path(header, poses))
+        scan.publish(LaserScan(header=Header(stamp=now, frame_id="laser"), angle_min=-math.pi,
+                               angle_increment=math.pi / 180, range_max=9.0,
+                               ranges=[1.6 + 0.3 * math.sin(i / 10) for i in range(360)]))
+        if tick % 5 == 0:
+            width = len(points) // 12
+            cloud.publish(PointCloud2(header=header, height=1, width=width, fields=fields,
+                                      point_step=12, row_step=len(points), data=points))
+"""
+"""A robot that drives in a circle, and everything around it."""
+
 _CHROMIUM, _DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 _ARGUMENTS = (
     "--headless=new",

@@ -15,8 +15,10 @@ from rosz.errors import UsageError
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import (
     Point,
+    PointStamped,
     PoseArray,
     PoseStamped,
+    PoseWithCovarianceStamped,
     Quaternion,
     Transform,
     TransformStamped,
@@ -28,7 +30,7 @@ from rosz.msgs.sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY, Pose, StaticTransformBroadcaster, TransformBroadcaster
 from rosz.web.model import Frames, Permission, System
-from rosz.web.scene import Look, Setup, format_setup, read_setup
+from rosz.web.scene import TOOLS, Look, Setup, Tools, format_setup, read_setup
 from rosz.web.scene.display import TopicDisplay
 from rosz.web.scene.drawing import Drawing
 from rosz.web.scene.poses import draw_map, draw_path, draw_poses
@@ -213,3 +215,31 @@ def test_a_display_waits_for_the_transform_and_names_it(network: Network) -> Non
     eventually(lambda: not publisher.subscribers(), "no subscription while it is hidden")
     display.close()
     frames.close()
+
+
+def test_tools_publish_what_rviz_publishes(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    got: dict[str, Any] = {}
+    topics: dict[str, Any] = {
+        "/initialpose": PoseWithCovarianceStamped,
+        "/move_base_simple/goal": PoseStamped,
+        "/clicked_point": PointStamped,
+    }
+    for topic, kind in topics.items():
+        robot.subscription(topic, kind, lambda message, topic=topic: got.update({topic: message}))
+    with pytest.raises(UsageError, match="read-only: it may not publish '/initialpose'"):
+        Tools(page, Permission(read_only=True)).take("estimate")
+    tools = Tools(page, Permission())
+    for name, tool in TOOLS.items():
+        tools.send(name, "map", (1.0, 2.0, 0.5), math.pi / 2)
+        eventually(lambda topic=tool.topic: topic in got, tool.topic)  # type: ignore[misc]
+    tools.close()
+    assert {message.header.frame_id for message in got.values()} == {"map"}
+    estimate = got["/initialpose"].pose
+    assert estimate.covariance[0] == estimate.covariance[7] == 0.25
+    assert estimate.covariance[35] == pytest.approx(0.06853892)
+    assert sum(1 for one in estimate.covariance if one) == 3
+    goal = got["/move_base_simple/goal"].pose
+    assert (goal.position.x, goal.position.y) == (1.0, 2.0)
+    assert (goal.orientation.z, goal.orientation.w) == pytest.approx((0.70710678, 0.70710678))
+    assert got["/clicked_point"].point == Point(1.0, 2.0, 0.5)

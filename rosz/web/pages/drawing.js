@@ -54,8 +54,10 @@ export default class Drawing {
       return found;
     };
     const old = [...this.mesh.children];
+    this.known = new Map(old.filter((one) => one.label).map((one) => [one.label, one]));
     const added = parts.map((part) => this[part.kind](part, take));
     for (const one of old) {
+      if (added.includes(one)) continue;
       if (one.own) one.geometry.dispose();
       if (one.material) {
         one.material.map?.dispose();
@@ -112,11 +114,19 @@ export default class Drawing {
   }
 
   text(part) {
+    const name = JSON.stringify([part.text, part.color, part.height]);
+    const known = this.known.get(name); // a new one would flicker
+    if (known) {
+      this.known.delete(name);
+      known.position.set(...part.at);
+      return known;
+    }
     const label = document.createElement("div");
     label.textContent = part.text;
     label.className = "rosz-label";
     if (part.color) label.style.color = part.color;
     const found = new CSS2DObject(label);
+    found.label = name;
     found.position.set(...part.at);
     if (part.height) {
       found.onBeforeRender = (renderer, scene, camera) => {

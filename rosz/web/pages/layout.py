@@ -104,8 +104,9 @@ body.body--dark .rosz-state-bad { color: #ff8f87; }
 body.body--dark .rosz-graph { --graph-text: #e6eaf2; --graph-node: #22345c;
   --graph-node-line: #6b9bff; --graph-topic: #33301f; --graph-topic-line: #b59c55;
   --graph-line: #75819a; }
-.rosz-label { font-size: 12px; white-space: nowrap; pointer-events: none;
+.rosz-label { font-size: 12px; color: var(--q-dark); white-space: nowrap; pointer-events: none;
   text-shadow: 0 0 3px var(--rosz-scene), 0 0 3px var(--rosz-scene), 0 0 3px var(--rosz-scene); }
+body.body--dark .rosz-label { color: #e6eaf2; }
 .rosz-scene { height: calc(100vh - 190px); min-height: 320px; }
 @media (min-width: 600px) { .rosz-narrow { display: none !important; } }
 @media (max-width: 599px) { .rosz-scene { height: 58vh; } .rosz-wide { display: none !important; } }

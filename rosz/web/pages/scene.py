@@ -13,6 +13,7 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from rosz.errors import RoszError
 from rosz.web.model import Frames, System
 from rosz.web.pages.layout import Frame, address_of
+from rosz.web.pages.pointing import Pointing
 from rosz.web.scene import (
     Display,
     Look,
@@ -98,30 +99,10 @@ class _ScenePage:
         self._keys: list[str] = []
         self._meshes = Meshes(system.node.context.environment, self._publish)
         self._chosen = bool(setup.frame)
+        self._pointing = Pointing(system, lambda: str(self._fixed.value or ""))
         with frame.content:
-            with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-                self._fixed = (
-                    ui.select(
-                        [setup.frame] if setup.frame else [],
-                        value=setup.frame or None,
-                        label="Fixed frame",
-                        with_input=True,
-                        on_change=self._choose_frame,
-                    )
-                    .props("dense options-dense")
-                    .classes("w-44")
-                )
-                self._view = (
-                    ui.toggle(_VIEWS, value=setup.view, on_change=self._look_from)
-                    .props("dense no-caps flat")
-                    .classes("rosz-view")
-                )
-                ui.space()
-                self._add = (
-                    ui.select({}, label="Add a display", on_change=self._add_chosen)
-                    .props("dense options-dense")
-                    .classes("w-60")
-                )
+            self._add_controls(setup)
+            self._pointing.add_row()
             with ui.element("div").classes(
                 "w-full grid gap-4 grid-cols-1 lg:grid-cols-[minmax(0,1fr)_19rem]"
             ):
@@ -129,12 +110,40 @@ class _ScenePage:
                     "rosz-card w-full overflow-hidden rosz-scene"
                 )
                 self._list = ui.column().classes("w-full gap-2 min-w-0")
+        self._pointing.add_pointer(self._scene)
         frame.keep(self)
+        frame.keep(self._pointing)
         for look in setup.looks:
             self._show(look)
         self._look_from(None)
         frame.every(_LIST_PERIOD, self._refresh_lists)
         frame.every(_PERIOD, self._refresh)
+
+    def _add_controls(self, setup: Setup) -> None:
+        with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+            self._fixed = (
+                ui.select(
+                    [setup.frame] if setup.frame else [],
+                    value=setup.frame or None,
+                    label="Fixed frame",
+                    with_input=True,
+                    on_change=self._choose_frame,
+                )
+                .props("dense options-dense")
+                .classes("w-44")
+            )
+            self._view = (
+                ui.toggle(_VIEWS, value=setup.view, on_change=self._look_from)
+                .props("dense no-caps flat")
+                .classes("rosz-view")
+            )
+            self._pointing.add_choice()
+            ui.space()
+            self._add = (
+                ui.select({}, label="Add a display", on_change=self._add_chosen)
+                .props("dense options-dense")
+                .classes("w-60")
+            )
 
     def close(self) -> None:
         """Close all displays."""
@@ -158,8 +167,8 @@ class _ScenePage:
 
     def _remove(self, shown: _Shown) -> None:
         self._shown.remove(shown)
-        shown.remove()
         self._changed()
+        shown.remove()
 
     def _add_chosen(self) -> None:
         name = self._add.value

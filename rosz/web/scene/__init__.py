@@ -8,16 +8,19 @@ from rosz.web.scene.display import Display
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.opening import list_displays, open_display
 from rosz.web.scene.setup import DEFAULT, GRID, ROBOT, TF, Look, Setup, format_setup, read_setup
+from rosz.web.scene.tools import TOOLS, Tools
 
 __all__ = (
     "DEFAULT",
     "GRID",
     "ROBOT",
     "TF",
+    "TOOLS",
     "Display",
     "Look",
     "Meshes",
     "Setup",
+    "Tools",
     "format_setup",
     "list_displays",
     "open_display",

@@ -1,0 +1,119 @@
+"""The view in space in a real browser: what is drawn is there, and what one points at arrives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from network import Network, eventually
+
+from .robot import LONG, SPACE, THEMES, World, open_browser, set_screen, take_picture
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
+
+_SHOW = "show=grid,tf,robot,/map,/cloud,/scan;color=%23ff3030,/markers,/path;color=%231f9d61"
+_DRAWN = """
+const root = Object.entries(window).find(([name]) => name.startsWith('scene_c'))?.[1];
+const found = {};
+root?.traverse((one) => {
+  const kind = one.isPoints ? 'points' : one.isInstancedMesh ? 'shapes'
+    : one.material?.map ? 'image' : one.isLineSegments ? 'lines' : '';
+  const count = one.isInstancedMesh ? one.count : one.geometry?.attributes.position.count ?? 0;
+  if (kind) found[kind] = Math.max(found[kind] ?? 0, count);
+});
+return found;
+"""
+
+
+@pytest.fixture(scope="module")
+def world() -> Iterator[World]:
+    network = Network()
+    try:
+        with open_browser() as browser:
+            robot = network.program(SPACE)
+            robot.wait_for("ready", LONG)
+            server = network.run("-m", "rosz", "web", "--port", "0")
+            yield World(network, robot, server, browser)
+    finally:
+        network.close()
+
+
+def drawn(world: World) -> dict[str, int]:
+    """Return the largest number of elements of each kind that the browser draws."""
+    found: dict[str, int] = world.browser.execute_script(_DRAWN)
+    return found
+
+
+def test_a_robot_and_its_world_are_shown(
+    world: World, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.getbasetemp() / "artefacts"
+    for screen, theme in THEMES:
+        set_screen(world.browser, screen, theme)
+        world.open(f"/3d?{_SHOW}")
+        world.should_see("a marker", "base_link", "102400 points", "100 x 80 cells", "360 of 360")
+        world.should_see("4 markers", "2 links", "nowhere")
+
+        def complete() -> bool:
+            found = drawn(world)
+            return found.get("points") == 102400 and {"shapes", "lines", "image"} <= found.keys()
+
+        eventually(complete, "all kinds of things in the view", LONG)
+        take_picture(world.browser, folder, f"space-{screen}-{theme}")
+        wide = "return document.documentElement.scrollWidth - window.innerWidth"
+        assert world.browser.execute_script(wide) <= 0
+        assert world.messages() == []
+
+
+def pull(world: World, tool: str) -> None:
+    """Take a tool, and pull with it in the middle of the view."""
+    from selenium.webdriver import ActionChains
+
+    world.click(tool)
+    taken = "return document.querySelector('.rosz-scene canvas').dataset.tool"
+    eventually(lambda: world.browser.execute_script(taken), f"{tool} is taken", LONG)
+    canvas = world.browser.find_element("css selector", ".rosz-scene canvas")
+    keys: Any = ActionChains(world.browser, duration=20)
+    keys.move_to_element_with_offset(canvas, 60, 40).click_and_hold()
+    keys.move_by_offset(60, 0).release().perform()
+
+
+def test_what_one_points_at_arrives(world: World) -> None:
+    set_screen(world.browser, "laptop", "light")
+    world.open(f"/3d?{_SHOW}&view=top")
+    world.should_see("102400 points")
+    eventually(lambda: drawn(world).get("points"), "something in the view", LONG)
+
+    def sent(tool: str, text: str) -> None:
+        pull(world, tool)
+        world.robot.wait_for(text, LONG)
+        idle = "return document.querySelector('.rosz-scene canvas').dataset.tool === ''"
+        eventually(lambda: world.browser.execute_script(idle), f"{tool} is put down", LONG)
+
+    sent("Goal", "goes to ")
+    assert " map" in world.robot.output.partition("goes to ")[2].partition("\n")[0]
+    sent("Pose estimate", "starts at 0.25")
+    sent("Point", "point ")
+    assert world.messages() == []
+
+
+def test_the_view_turns_and_displays_come_and_go(world: World) -> None:
+    from selenium.webdriver import ActionChains
+
+    set_screen(world.browser, "laptop", "light")
+    world.open("/3d?show=grid,/scan;color=%23ff3030")
+    world.should_see("360 of 360")
+    where = """
+const scene = getElement(Number(document.querySelector('.rosz-scene').id.slice(1)));
+return scene.get_camera().position;
+"""
+    before = world.browser.execute_script(where)
+    canvas = world.browser.find_element("css selector", ".rosz-scene canvas")
+    ActionChains(world.browser).drag_and_drop_by_offset(canvas, 120, 30).perform()
+    eventually(lambda: world.browser.execute_script(where) != before, "another view", LONG)
+    world.browser.find_element("css selector", "[aria-label='Remove /scan']").click()
+    eventually(lambda: "points" not in drawn(world), "no scan in the view", LONG)
+    eventually(lambda: "/scan" not in world.browser.current_url, "the address", LONG)
+    assert "show=grid" in world.browser.current_url
+    assert world.messages() == []
