@@ -132,6 +132,17 @@ class History:
             return parent, (pose, pose, 0.0)
         return parent, (pose, pose_after, (stamp - began) / (stamps[after] - began))
 
+    def parent_at(self, stamp: int) -> str:
+        """Return the parent at a time; empty if the time is not known."""
+        places = self._places
+        if self.static:
+            return places[0][0]
+        stamps = self._stamps
+        after = bisect_right(stamps, stamp, self._first)
+        if after == self._first or (after == len(stamps) and stamps[-1] != stamp):
+            return ""
+        return places[after - 1][0]
+
     def why_not(self, stamp: int) -> str:
         """Return why a time is not known."""
         first, last = self.oldest, self.latest
@@ -313,6 +324,8 @@ class Buffer:
 
     def why_not(self, target: str, source: str, stamp: int = 0) -> str:
         """Return why a transform is not known; empty if it is."""
+        if stamp and self._is_known(target, source, stamp):
+            return ""
         for name, role in ((target, "target_frame"), (source, "source_frame")):
             if not self.has(name):
                 return f"canTransform: {role} {name} does not exist."
@@ -321,6 +334,21 @@ class Buffer:
         except TransformError as error:
             return str(error)
         return ""
+
+    def _is_known(self, target: str, source: str, stamp: int) -> bool:
+        """Return whether a transform is known, if one of the frames is above the other."""
+        with self._lock:
+            frames = self._frames
+            for end, top in ((source, target), (target, source)):
+                frame = end
+                for _ in range(_MAX_DEPTH):
+                    history = frames.get(frame)
+                    if history is None:
+                        break
+                    frame = history.parent_at(stamp)
+                    if frame == top:
+                        return True
+        return False
 
     def chain(self, target: str, source: str) -> list[str]:
         """Return the frames between two frames, from the source to the target.

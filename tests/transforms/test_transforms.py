@@ -67,6 +67,8 @@ def tell(parent, child, seconds, numbers, static=False):
     t, r = made.transform.translation, made.transform.rotation
     t.x, t.y, t.z, r.x, r.y, r.z, r.w = numbers
     (buffer.set_transform_static if static else buffer.set_transform)(made, "me")
+def known(target, source, seconds):
+    return bool(buffer.can_transform_core(target, source, Time.from_sec(seconds))[0])
 def ask(target, source, seconds):
     try:
         found = buffer.lookup_transform_core(target, source, Time.from_sec(seconds))
@@ -109,7 +111,9 @@ def test_random_trees(seed: int) -> None:
         for _ in range(60)
     ]
     same(
-        _SETUP + "\n".join(lines) + f"\nresult = [ask(*one) for one in {questions}]\n",
+        _SETUP
+        + "\n".join(lines)
+        + f"\nresult = [[ask(*one), known(*one)] for one in {questions}]\n",
         *_REAL,
     )
 
