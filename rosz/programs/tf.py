@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rosz.errors import RoszError, TransformError, UsageError
+from rosz.errors import ParamNotFound, RoszError, TransformError, UsageError
 from rosz.message.convert import from_plain
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
@@ -163,7 +163,7 @@ def static_transform_publisher_of_tf2() -> None:
                 else parse_transform(words, leading_number)
             )
         except RoszError as error:
-            _refuse(f"static_transform_publisher: {error}\n{_TF2_USAGE}")
+            _refuse(f"static_transform_publisher: {_phrase(words, error)}\n{_TF2_USAGE}")
         transform.header.stamp = Time.from_nsec(node.now())
         StaticTransformBroadcaster(node).send(transform)
         node.log.info(
@@ -172,6 +172,17 @@ def static_transform_publisher_of_tf2() -> None:
             transform.child_frame_id,
         )
         node.spin()
+
+
+def _phrase(words: Sequence[str], error: RoszError) -> str:
+    """Return the text of an error with the words of ROS 1's program, which scripts look for."""
+    if len(words) == 1:
+        unread = isinstance(error, ParamNotFound)
+        what = "read TF from parameter server" if unread else "validate XmlRpcC for TF data"
+        return f"Could not {what}: {error}"
+    if len(words) in {_EULER + 2, _QUATERNION + 2}:
+        return str(error)
+    return f"exited due to not having the right number of arguments: {error}"
 
 
 def _of_param(node: Node, name: str) -> TransformStamped:

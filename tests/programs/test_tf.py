@@ -148,14 +148,17 @@ def test_the_program_of_tf_dates_ahead(network: Network) -> None:
 
 
 def test_wrong_words(network: Network) -> None:
-    for words in (
-        ["tf", "static_transform_publisher", "1"],
-        ["tf2_ros", "static_transform_publisher", "1", "2"],
-        ["tf", "tf_echo", "a", "b", "0"],
+    network.node("setter").params["/unfit"] = {"speed": 1}
+    for words, text in (
+        (["tf", "static_transform_publisher", "1"], "usage: "),
+        (["tf2_ros", "static_transform_publisher"], "exited due to not having the right number"),
+        (["tf2_ros", "static_transform_publisher", "/none"], "Could not read TF from parameter"),
+        (["tf2_ros", "static_transform_publisher", "/unfit"], "Could not validate XmlRpcC"),
+        (["tf", "tf_echo", "a", "b", "0"], "usage: "),
     ):
         program = start(network, "run", *words)
         assert program.exit_code() == 255
-        assert "usage: " in program.output
+        assert text in program.output
 
 
 CLIENT = """
