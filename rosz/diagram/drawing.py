@@ -12,6 +12,7 @@ __all__ = ("label_of", "labels_of", "write_dot", "write_mermaid", "write_svg")
 
 _FEW = 2
 _LETTER = 6.3
+_LABEL_STEP = 8
 _NARROWEST_GAP, _WIDEST_GAP = 72.0, 260.0
 _GROUP_MARGIN = 8.0
 _STYLE = """
@@ -70,7 +71,9 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
     """
     labels = labels_of(picture, rates or {})
     plain = [label_of(arrow, {}) for arrow in picture.arrows]
-    longest = max(map(len, plain), default=0) + 8 * bool(rates)
+    # In steps, so that a rate that changes rarely changes the layout.
+    wide = -(-max(map(len, labels), default=0) // _LABEL_STEP) * _LABEL_STEP
+    longest = max(wide, max(map(len, plain), default=0) + _LABEL_STEP * bool(rates))
     gap = min(_WIDEST_GAP, max(_NARROWEST_GAP, longest * _LETTER + 24))
     layout = lay_out(picture, gap)
     parts = [

@@ -24,6 +24,7 @@ from rosz.msgs.sensor_msgs.msg import BatteryState, Image
 from rosz.msgs.std_msgs.msg import Float64MultiArray, Header, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.web.model import (
+    Condition,
     Driver,
     FloorPlan,
     Form,
@@ -374,6 +375,9 @@ def test_the_log_is_bounded_and_filtered(network: Network) -> None:
     assert texts(pattern="mov") == ["it moves"]
     assert texts(until=book.received - 1) == ["it moves"]
     assert len(book.newest(LogFilter(), [robot.name], 1)) == 1
+    lines = {line.text: line.stamp for _, line in book.newest(LogFilter(), [robot.name], 9)}
+    only = book.newest(LogFilter(), [robot.name], 9, None, (lines["it burns"], math.inf))
+    assert [line.text for _, line in only] == ["it burns"]
     book.clear()
     assert texts() == []
     book.close()
@@ -415,3 +419,45 @@ def test_a_robot_is_found_beside_its_velocities(network: Network) -> None:
 
     eventually(is_drawn, "the robot")
     floor.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("linear/x > 0.5", True),
+        ("linear.x<=0.5", False),
+        ("linear/x == 1", True),
+        ("linear/w == 1", False),
+        ("linear/x contains 1.", True),
+        ("linear/x > much", False),
+    ],
+)
+def test_conditions_compare_a_field_with_a_value(text: str, holds: bool) -> None:
+    assert Condition(text).accepts(Twist(linear=Vector3(x=1.0))) is holds
+
+
+def test_conditions_are_no_programs() -> None:
+    assert Condition("data contains 'go'").accepts(String(data="let it go"))
+    assert Condition("data != go").accepts(String(data="stay"))
+    for text in ("__import__('os').getcwd()", "m.data", "data >", ""):
+        with pytest.raises(UsageError, match="expected a field"):
+            Condition(text)
+
+
+def test_only_messages_that_fulfil_a_condition_are_kept(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    publisher = robot.publisher("cmd_vel", Twist)
+    graph = System(page, Permission()).graph.use().value
+    eventually(lambda: graph.survey().view.publishers("/cmd_vel"), "the publisher")
+    watch = TopicWatch(page, graph.survey(), "/cmd_vel", Condition("linear/x > 1"))
+    number = 0
+
+    def arrived() -> bool:
+        nonlocal number
+        number += 1
+        publisher.publish(Twist(linear=Vector3(x=float(number % 3))))
+        return watch.received > 6
+
+    eventually(arrived, "messages")
+    assert watch.message().linear.x == 2.0
+    watch.close()

@@ -78,6 +78,16 @@ def test_what_pages_do_arrives(world: World) -> None:
     world.open("/topics?topic=/cmd_vel")
     world.should_hold("textarea", "angular:")
     world.send("linear: {x: 1.5}", "Publish once", lambda: "drives 1.5" in world.robot.output)
+    world.open("/topics?topic=/chatter&condition=data+contains+7")
+    world.should_see("hello")
+    world.open("/topics?topic=/chatter&condition=data+contains+none")
+    world.should_see("messages fulfils the condition")
+    world.open("/console?begin=00:00&pattern=battery&level=WARN")
+    world.should_see("the battery is low")
+    world.open("/console?pattern=no+such+text")
+    world.should_see("No line yet")
+    world.open("/topics?topic=/cmd_vel")
+    world.should_hold("textarea", "angular:")
     world.send("linear: {x: much}", "Publish once", lambda: "linear.x" in world.text)
     world.open("/services?service=/enable")
     world.should_hold("textarea", "data: false")
@@ -186,6 +196,10 @@ def test_the_graph_tells_of_what_is_clicked(world: World) -> None:
         ".dispatchEvent(new MouseEvent('click', {bubbles: true}))"
     )
     world.should_see("Type: std_msgs/String", "Publishers:")
+    world.open("/graph?content=all&topics=/chatter&hide=unconnected&labels=types")
+    world.should_see("std_msgs/String")
+    nodes = "return document.querySelectorAll('.node').length"
+    eventually(lambda: world.browser.execute_script(nodes) == 1, "one node", LONG)
     assert world.messages() == []
 
 

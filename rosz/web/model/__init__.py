@@ -21,7 +21,7 @@ from rosz.web.model.reconfiguring import Reconfiguration
 from rosz.web.model.sending import Sending
 from rosz.web.model.sharing import Shared
 from rosz.web.model.system import System
-from rosz.web.model.topic import TopicWatch, message_tree
+from rosz.web.model.topic import Condition, TopicWatch, message_tree
 from rosz.web.model.traffic import Traffic
 
 __all__ = (
@@ -29,6 +29,7 @@ __all__ = (
     "ActionRow",
     "ActionUse",
     "Actions",
+    "Condition",
     "Driver",
     "Findings",
     "FloorPlan",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 from collections import deque
 from collections.abc import Iterator
@@ -59,7 +60,12 @@ class LogBook:
             self._bytes = 0
 
     def newest(
-        self, wanted: LogFilter, nodes: list[str], most: int, until: int | None = None
+        self,
+        wanted: LogFilter,
+        nodes: list[str],
+        most: int,
+        until: int | None = None,
+        between: tuple[float, float] = (0.0, math.inf),
     ) -> list[tuple[int, LogLine]]:
         """Return the newest lines that pass a filter, each with its number, the newest first.
 
@@ -68,12 +74,13 @@ class LogBook:
             nodes: Full names of the known nodes.
             most: Largest number of lines.
             until: Number of the newest line to return; the last one when not given.
+            between: Times in seconds since the Unix epoch; lines before and after are left out.
         """
         with self._lock:
             samples = list(self._samples)
         found: list[tuple[int, LogLine]] = []
         for number, line in _lines(samples, nodes, until):
-            if wanted.accepts(line):
+            if between[0] <= line.stamp <= between[1] and wanted.accepts(line):
                 found.append((number, line))
                 if len(found) >= most:
                     break

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import operator
+import re
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from rosz.errors import DecodeError, UsageError
+from rosz.introspect.fields import FieldPath
 from rosz.introspect.measure import BandwidthMeter, DelayMeter, DelayStats, read_stamp
 from rosz.introspect.subscribe import find_class, find_token, topic_types
 from rosz.message import Message
@@ -17,12 +22,64 @@ if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
     from rosz.node import Node
 
-__all__ = ("TopicWatch", "message_tree")
+__all__ = ("Condition", "TopicWatch", "message_tree")
 
 _QUEUE = 3
 _MOST_ELEMENTS = 30
 _LONGEST_TEXT = 200
 _FEW_BYTES = 16
+_OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<=": operator.le,
+    ">=": operator.ge,
+    "<": operator.lt,
+    ">": operator.gt,
+    "contains": operator.contains,
+}
+_COMPARISON = re.compile(r"([\w/.\[\]:]+)\s*(==|!=|<=|>=|<|>|\bcontains\b)\s*(.+)")
+_TRUTHS = {"true": 1.0, "false": 0.0}
+
+
+class Condition:
+    """A comparison of a field with a value, such as ``pose/x > 3`` or ``data contains go``.
+
+    It is not Python, as that of ``rostopic`` is, since those who see a page may not run programs.
+
+    Args:
+        text: The comparison.
+
+    Raises:
+        UsageError: It is not one.
+    """
+
+    def __init__(self, text: str) -> None:
+        match = _COMPARISON.fullmatch(text.strip())
+        if match is None:
+            raise UsageError(
+                f"'{text}' is not a condition; expected a field, one of {', '.join(_OPERATORS)},"
+                " and a value, such as linear/x > 0.5"
+            )
+        path, self._operator, value = match.groups()
+        self._path = FieldPath(path.replace(".", "/"))
+        self._value = value.strip("'\"")
+        try:
+            self._number: float | None = float(self._value)
+        except ValueError:
+            self._number = _TRUTHS.get(self._value.lower())
+
+    def accepts(self, message: Any) -> bool:
+        """Return whether a message fulfils it; one without the field does not."""
+        try:
+            found = self._path.read(message)
+        except (LookupError, AttributeError):
+            return False
+        if isinstance(found, TimeValue | DurationValue):
+            found = found.to_sec()
+        compare = _OPERATORS[self._operator]
+        if self._operator != "contains" and isinstance(found, int | float):
+            return self._number is not None and compare(found, self._number)
+        return compare(str(found), self._value)
 
 
 class TopicWatch:
@@ -32,6 +89,7 @@ class TopicWatch:
         node: The node that subscribes to it.
         survey: The running nodes.
         topic: Full name of the topic.
+        condition: What messages have to fulfil to be kept; all are counted.
 
     Attributes:
         topic: Full name of the topic.
@@ -44,12 +102,15 @@ class TopicWatch:
         DefinitionError: Its definition differs from the one here.
     """
 
-    def __init__(self, node: Node, survey: Survey, topic: str) -> None:
+    def __init__(
+        self, node: Node, survey: Survey, topic: str, condition: Condition | None = None
+    ) -> None:
         types = topic_types(survey.view).get(topic, ("",))
         token = find_token(survey.view, topic, types[0])
         self.topic: str = topic
         self.type_name: str = token.type_name
         self.received: int = 0
+        self._condition = condition
         self._now = node.now
         self._payload: bytes | None = None
         self._message: tuple[bytes, Any] | None = None
@@ -68,7 +129,14 @@ class TopicWatch:
         self._sizes.add(len(payload), time.monotonic_ns())
         if self._stamped:
             self._ages.add(read_stamp(payload, self.type_name), self._now())
-        self._payload = payload
+        if self._condition is None or self._fulfils(self._condition, payload):
+            self._payload = payload
+
+    def _fulfils(self, condition: Condition, payload: bytes) -> bool:
+        try:
+            return condition.accepts(self._decode(payload))
+        except DecodeError:  # which `message` reports of all messages
+            return True
 
     def message(self) -> Any:
         """Return the newest message; None before the first one.

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import datetime as dt
+import math
 import time
 from typing import Any
+from urllib.parse import urlencode
 
+import msgspec
 from nicegui import ui
 
 from rosz.errors import UsageError
 from rosz.introspect.nodes import find_nodes, get_levels, set_level
 from rosz.introspect.rosout import LogFilter, LogLine, format_line
 from rosz.web.model import System
-from rosz.web.pages.layout import Frame, empty_state
+from rosz.web.pages.layout import Frame, address_of, empty_state
 
-__all__ = ("show_console",)
+__all__ = ("Wanted", "show_console")
 
 _PERIOD = 0.5
 _MOST = 300
@@ -26,30 +30,61 @@ _TEXT_CELL = """<q-td :props="props" style="white-space: pre-wrap; word-break: b
 {{ props.row.node }} {{ props.row.time }}</div></q-td>"""
 
 
-def show_console(system: System, node: str, level: str, pattern: str) -> None:
+class Wanted(msgspec.Struct, frozen=True):
+    """The lines that a page shows.
+
+    Attributes:
+        node: Node or namespace; empty for all.
+        level: The lowest level.
+        pattern: Pattern in the text.
+        begin: Time of today from which on, such as ``14:05`` or ``14:05:30``; empty for all.
+        end: Time of today up to which.
+    """
+
+    node: str = ""
+    level: str = "DEBUG"
+    pattern: str = ""
+    begin: str = ""
+    end: str = ""
+
+    def times(self) -> tuple[float, float]:
+        """Return the times in seconds since the Unix epoch; what is no time is left open."""
+        today = dt.datetime.now().astimezone()
+        found = [0.0, math.inf]
+        for number, text in enumerate((self.begin, self.end)):
+            try:
+                clock = dt.time.fromisoformat(text)
+            except ValueError:
+                continue
+            found[number] = dt.datetime.combine(today, clock, today.tzinfo).timestamp()
+        return found[0], found[1]
+
+
+def show_console(system: System, wanted: Wanted) -> None:
     """Build the page.
 
     Args:
         system: The system.
-        node: Node or namespace whose lines are shown; empty for all.
-        level: The lowest level.
-        pattern: Pattern in the text.
+        wanted: The lines that it shows at first.
     """
-    _Console(system, node, level if level in _LEVELS else "DEBUG", pattern)
+    if wanted.level not in _LEVELS:
+        wanted = msgspec.structs.replace(wanted, level="DEBUG")
+    _Console(system, wanted)
 
 
 class _Console:
     """The table of lines with its filter."""
 
-    def __init__(self, system: System, node: str, level: str, pattern: str) -> None:
+    def __init__(self, system: System, wanted: Wanted) -> None:
         self._system = system
         self._frame = frame = Frame(system, "Console", "/console")
         self._graph, self._book = frame.use(system.graph), frame.use(system.console)
-        self._wanted = self._make_filter(node, level, pattern)
+        self._choice = wanted
+        self._wanted = self._make_filter()
         self._until: int | None = None
         self._shown: object = None
         with frame.content:
-            self._add_filter(node, level, pattern)
+            self._add_filter()
             self._table = self._add_table()
             self._empty = empty_state(
                 "subject",
@@ -59,23 +94,28 @@ class _Console:
             )
         frame.every(_PERIOD, self._refresh)
 
-    def _add_filter(self, node: str, level: str, pattern: str) -> None:
+    def _add_filter(self) -> None:
+        choice = self._choice
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-            self._level = (
-                ui.select(_LEVELS, value=level, label="Lowest level", on_change=self._filter)
-                .props("dense options-dense")
-                .classes("w-28")
-            )
-            self._node = (
-                ui.input("Node", value=node, on_change=self._filter)
-                .props("dense clearable debounce=300")
-                .classes("w-40")
-            )
-            self._pattern = (
-                ui.input("Text", value=pattern, on_change=self._filter)
-                .props("dense clearable debounce=300")
-                .classes("w-48")
-            )
+            ui.select(
+                _LEVELS,
+                value=choice.level,
+                label="Lowest level",
+                on_change=lambda change: self._filter(level=change.value),
+            ).props("dense options-dense").classes("w-28")
+            for field, label, props in (
+                ("node", "Node", "clearable"),
+                ("pattern", "Text", "clearable"),
+                ("begin", "From", "type=time step=1 stack-label"),
+                ("end", "To", "type=time step=1 stack-label"),
+            ):
+                ui.input(
+                    label,
+                    value=getattr(choice, field),
+                    on_change=lambda change, field=field: self._filter(
+                        **{field: change.value or ""}
+                    ),
+                ).props(f"dense debounce=300 {props}").classes("w-32")
             ui.space()
             self._pause = ui.button("Pause", icon="pause", on_click=self._toggle).props(
                 "flat dense no-caps"
@@ -117,22 +157,28 @@ class _Console:
         table.add_slot("body-cell-text", _TEXT_CELL)
         return table
 
-    def _filter(self) -> None:
-        self._wanted = self._make_filter(
-            self._node.value or "", self._level.value, self._pattern.value or ""
-        )
+    def _filter(self, **changes: str) -> None:
+        self._choice = msgspec.structs.replace(self._choice, **changes)
+        self._wanted = self._make_filter()
+        given = {
+            name: value
+            for name, value in msgspec.structs.asdict(self._choice).items()
+            if value != getattr(Wanted(), name)
+        }
+        address_of("/console?" + urlencode(given, safe="/:") if given else "/console")
         self._shown = None
         self._refresh()
 
-    def _make_filter(self, node: str, level: str, pattern: str) -> LogFilter:
+    def _make_filter(self) -> LogFilter:
         """Return a filter; one without the pattern if that is not a regular expression."""
-        name = node.strip()
+        choice = self._choice
+        name = choice.node.strip()
         nodes = (name if name.startswith("/") else f"/{name}",) if name else ()
         try:
-            found = LogFilter(nodes, level, pattern)
+            found = LogFilter(nodes, choice.level, choice.pattern)
         except UsageError as error:
             self._frame.show_fault(str(error))
-            return LogFilter(nodes, level)
+            return LogFilter(nodes, choice.level)
         self._frame.show_fault("")
         return found
 
@@ -148,7 +194,7 @@ class _Console:
 
     def _newest(self, most: int) -> list[tuple[int, LogLine]]:
         nodes = self._graph.survey().view.nodes()
-        return self._book.newest(self._wanted, nodes, most, self._until)
+        return self._book.newest(self._wanted, nodes, most, self._until, self._choice.times())
 
     def _refresh(self) -> None:
         state = (self._until or self._book.received, self._wanted)

@@ -24,6 +24,7 @@ from rosz.errors import RoszError
 from rosz.introspect.nodes import find_nodes, format_node
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import format_topic
+from rosz.names import short_type
 from rosz.web.model import System, Traffic
 from rosz.web.pages.layout import Frame, address_of, empty_state, short_rate_text
 
@@ -40,6 +41,8 @@ _SWITCHES = {
     "hide_leaves": "Hide topics without subscribers",
     "hide_unconnected": "Hide nodes without topics",
 }
+_USUAL = "usual"
+_LABELS = {"rates": "Rates on the arrows", "types": "Types on the arrows"}
 _PICK = """(event) => {
   const box = event.target.closest('[data-key]');
   if (box && (event.type === 'click' || event.key === 'Enter')) emit(box.dataset.key);
@@ -54,7 +57,16 @@ _RELABEL = """(labels) => {
 }"""
 
 
-def show_graph(system: System, content: str, nodes: str, topics: str, group: int) -> None:
+def show_graph(
+    system: System,
+    content: str,
+    nodes: str,
+    topics: str,
+    *,
+    group: int,
+    hide: str,
+    labels: str,
+) -> None:
     """Build the page.
 
     Args:
@@ -63,13 +75,19 @@ def show_graph(system: System, content: str, nodes: str, topics: str, group: int
         nodes: Patterns of nodes.
         topics: Patterns of topics.
         group: Depth of the namespaces that get a frame.
+        hide: What is left out, such as ``tf,leaves``; the choice of rqt_graph if it is ``usual``.
+        labels: What is written on arrows, of ``rates`` and ``types``.
     """
     shown: Content = "nodes"
     for one in get_args(Content):
         if one == content:
             shown = one
     options = PictureOptions(content=shown, nodes=nodes, topics=topics, group=max(0, group))
-    _Graph(system, options)
+    if hide != _USUAL:
+        hidden = set(hide.split(","))
+        switches = {name: name.removeprefix("hide_") in hidden for name in _SWITCHES}
+        options = msgspec.structs.replace(options, **switches)
+    _Graph(system, options, [one for one in _LABELS if one in labels.split(",")])
 
 
 class _Shown(NamedTuple):
@@ -77,12 +95,12 @@ class _Shown(NamedTuple):
 
     Args:
         picture: Boxes and arrows.
-        rated: Whether arrows have rates.
+        written: What is written on arrows.
         chosen: Key of the box that is emphasised.
     """
 
     picture: Picture
-    rated: bool
+    written: tuple[str, ...]
     chosen: str
 
 
@@ -92,10 +110,12 @@ class _Graph:
     Args:
         system: The system.
         options: What is shown at first.
+        labels: What is written on arrows at first.
     """
 
-    def __init__(self, system: System, options: PictureOptions) -> None:
+    def __init__(self, system: System, options: PictureOptions, labels: list[str]) -> None:
         self._options = options
+        self._written = tuple(labels)
         self._frame = frame = Frame(system, "Graph", "/graph")
         self._system = system
         self._watch = frame.use(system.graph)
@@ -108,7 +128,6 @@ class _Graph:
         self._picture = Picture()
         self._chosen = ""
         self._zoom = 100
-        self._rates = True
         with frame.content:
             self._add_choices()
             self._empty = empty_state(
@@ -177,9 +196,14 @@ class _Graph:
                     value=getattr(options, field),
                     on_change=lambda change, field=field: self._choose(**{field: change.value}),
                 ).props("dense")
-            ui.switch("Rates on the arrows", value=True, on_change=self._choose_rates).props(
-                "dense"
-            )
+            for name, label in _LABELS.items():
+                ui.switch(
+                    label,
+                    value=name in self._written,
+                    on_change=lambda change, name=name: self._choose_label(
+                        name, shown=bool(change.value)
+                    ),
+                ).props("dense")
             ui.number(
                 "Frames around namespaces",
                 value=options.group,
@@ -191,17 +215,28 @@ class _Graph:
 
     def _choose(self, **changes: object) -> None:
         self._options = msgspec.structs.replace(self._options, **changes)
-        options = self._options
+        self._show_address()
+        self._refresh()
+
+    def _show_address(self) -> None:
+        options, usual = self._options, PictureOptions()
         query = {
             name: str(getattr(options, name))
             for name in ("content", "nodes", "topics", "group")
-            if getattr(options, name) != getattr(PictureOptions(), name)
+            if getattr(options, name) != getattr(usual, name)
         }
+        if any(getattr(options, name) != getattr(usual, name) for name in _SWITCHES):
+            hidden = [name for name in _SWITCHES if getattr(options, name)]
+            query["hide"] = ",".join(name.removeprefix("hide_") for name in hidden)
+        if self._written != ("rates",):
+            query["labels"] = ",".join(self._written)
         address_of("/graph?" + urlencode(query, safe="/*,") if query else "/graph")
-        self._refresh()
 
-    def _choose_rates(self, change: object) -> None:
-        self._rates = bool(getattr(change, "value", True))
+    def _choose_label(self, name: str, *, shown: bool) -> None:
+        self._written = tuple(
+            one for one in _LABELS if (shown if one == name else one in self._written)
+        )
+        self._show_address()
         self._refresh()
 
     def _scale(self, step: int) -> None:
@@ -211,7 +246,7 @@ class _Graph:
     def _refresh(self) -> None:
         """Draw what has changed; the rates on the arrows change once a second."""
         survey, now = self._watch.survey(), time.monotonic()
-        wanted = survey, self._options, self._chosen, self._rates
+        wanted = survey, self._options, self._chosen, self._written
         if wanted == self._wanted and now < self._due:
             return
         self._traffic.update(survey)
@@ -221,8 +256,8 @@ class _Graph:
         self._wanted, self._due = wanted, now + _RATES_PERIOD
         self._empty.set_visibility(not self._picture.boxes and self._watch.complete)
         self._card.set_visibility(bool(self._picture.boxes))
-        flows = self._flows() if self._rates else {}
-        shown = _Shown(self._picture, bool(flows), self._chosen)
+        flows = self._flows()
+        shown = _Shown(self._picture, self._written if flows else (), self._chosen)
         if shown != self._shown:
             self._shown = shown
             background_tasks.create(self._draw(shown, flows))
@@ -242,11 +277,16 @@ class _Graph:
             self._drawn = True
 
     def _flows(self) -> dict[str, str]:
+        """Return what is written on arrows, by topic."""
+        topics = {topic for arrow in self._picture.arrows for topic in arrow.topics}
+        types = self._watch.survey().view.topics() if "types" in self._written else {}
         found = {}
-        for topic in {topic for arrow in self._picture.arrows for topic in arrow.topics}:
-            flow = self._traffic.flow(topic)
-            if flow is not None:
-                found[topic] = short_rate_text(flow.rate)
+        for topic in topics:
+            flow = self._traffic.flow(topic) if "rates" in self._written else None
+            parts = [] if flow is None else [short_rate_text(flow.rate)]
+            parts += map(short_type, types.get(topic, ()))
+            if parts:
+                found[topic] = " ".join(parts)
         return found
 
     def _pick(self, event: GenericEventArguments) -> None:

@@ -8,7 +8,7 @@ from nicegui import app, ui
 from rosz.errors import RoszError
 from rosz.web.model import System
 from rosz.web.pages.actions import show_actions
-from rosz.web.pages.console import show_console
+from rosz.web.pages.console import Wanted, show_console
 from rosz.web.pages.drive import show_drive
 from rosz.web.pages.graph import show_graph
 from rosz.web.pages.images import show_images
@@ -37,8 +37,15 @@ def add_pages(system: System) -> None:
         show_overview(system)
 
     @ui.page("/graph")
-    def graph(content: str = "nodes", nodes: str = "", topics: str = "", group: int = 0) -> None:
-        show_graph(system, content, nodes, topics, group)
+    def graph(  # the choices that an address holds
+        content: str = "nodes",
+        nodes: str = "",
+        topics: str = "",
+        group: int = 0,
+        hide: str = "usual",
+        labels: str = "rates",
+    ) -> None:
+        show_graph(system, content, nodes, topics, group=group, hide=hide, labels=labels)
 
 
 def _add_pages_of_launches(system: System) -> None:
@@ -49,8 +56,8 @@ def _add_pages_of_launches(system: System) -> None:
 
 def _add_pages_of_data(system: System) -> None:
     @ui.page("/topics")
-    def topics(topic: str = "", field: str = "") -> None:
-        show_topics(system, topic, field)
+    def topics(topic: str = "", field: str = "", condition: str = "") -> None:
+        show_topics(system, topic, field, condition)
 
     @ui.page("/images")
     def images(topics: str = "") -> None:
@@ -67,8 +74,10 @@ def _add_pages_of_data(system: System) -> None:
         show_scene(system, frame, show, view)
 
     @ui.page("/console")
-    def console(node: str = "", level: str = "DEBUG", pattern: str = "") -> None:
-        show_console(system, node, level, pattern)
+    def console(
+        node: str = "", level: str = "DEBUG", pattern: str = "", begin: str = "", end: str = ""
+    ) -> None:
+        show_console(system, Wanted(node, level, pattern, begin, end))
 
 
 def _add_pages_of_nodes(system: System) -> None:

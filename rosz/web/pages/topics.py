@@ -11,7 +11,8 @@ from rosz.errors import RoszError
 from rosz.introspect.fields import FieldPath
 from rosz.introspect.topics import find_topic, list_topics
 from rosz.names import short_type
-from rosz.web.model import Sending, System, TopicWatch, form_of, message_tree
+from rosz.web.model import Condition, Sending, System, TopicWatch, message_tree
+from rosz.web.pages.form import MessageForm
 from rosz.web.pages.layout import (
     Frame,
     address_of,
@@ -28,25 +29,27 @@ _MILLI = 1e3
 _FASTEST = 1000.0
 
 
-def show_topics(system: System, topic: str, field: str) -> None:
+def show_topics(system: System, topic: str, field: str, condition: str) -> None:
     """Build the page.
 
     Args:
         system: The system.
         topic: Topic to show; empty for none.
         field: Path of the field to show; empty for the whole message.
+        condition: What a message has to fulfil to be shown; empty for all.
     """
-    _Topics(system, topic, field)
+    _Topics(system, topic, field, condition)
 
 
 class _Topics:
     """The choice of a topic, and the topic."""
 
-    def __init__(self, system: System, topic: str, field: str) -> None:
+    def __init__(self, system: System, topic: str, field: str, condition: str) -> None:
         self._system = system
         self._frame = frame = Frame(system, "Topics", "/topics")
         self._graph = frame.use(system.graph)
         self._field = field
+        self._condition = condition
         self._watch: TopicWatch | None = None
         self._fault = ""
         with frame.content:
@@ -73,6 +76,12 @@ class _Topics:
                     .props("dense clearable debounce=400")
                     .classes("w-40")
                 )
+                ui.input(
+                    "Only if",
+                    value=condition,
+                    placeholder="linear/x > 0.5",
+                    on_change=lambda change: self._choose_condition(change.value or ""),
+                ).props("dense clearable debounce=600").classes("w-40")
                 self._frozen = ui.switch("Freeze").props("dense")
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
                 self._echo = _Echo()
@@ -113,8 +122,16 @@ class _Topics:
         self._echo.clear()
         self._show_address()
 
+    def _choose_condition(self, condition: str) -> None:
+        self._condition = condition
+        self._choose(self._select.value)
+
     def _show_address(self) -> None:
-        query = {"topic": self._select.value, "field": self._field}
+        query = {
+            "topic": self._select.value,
+            "field": self._field,
+            "condition": self._condition,
+        }
         given = {name: value for name, value in query.items() if value}
         address_of("/topics?" + urlencode(given, safe="/") if given else "/topics")
 
@@ -123,7 +140,8 @@ class _Topics:
             self._system.permission.check("subscribe", topic)
             survey = self._graph.survey()
             find_topic(survey, topic)
-            self._watch = TopicWatch(self._system.node, survey, topic)
+            condition = Condition(self._condition) if self._condition.strip() else None
+            self._watch = TopicWatch(self._system.node, survey, topic, condition)
         except RoszError as error:
             self._fault = str(error) if self._graph.complete else ""
             return
@@ -196,6 +214,8 @@ class _Echo:
             parts.append(f"{delay.mean * _MILLI:.1f} ms old")
         self._flow.set_text(" · ".join(parts))
         text = "" if watch.received else "No message has come yet."
+        if watch.received and watch.message() is None:
+            text = f"None of {watch.received} messages fulfils the condition."
         if self._note.text != text:
             self._note.set_text(text)
             self._note.set_visibility(bool(text))
@@ -234,10 +254,8 @@ class _Publish:
                 self._type = (
                     ui.input("Type", placeholder="std_msgs/String").props("dense").classes("grow")
                 )
-            self._text = (
-                ui.textarea("Fields in YAML; those left out have their default value")
-                .props("outlined autogrow input-class=rosz-mono")
-                .classes("w-full")
+            self._form = MessageForm(
+                system.node, "Fields in YAML; those left out have their default value"
             )
             with ui.row().classes("w-full items-center gap-3"):
                 ui.button("Fill in", on_click=self._fill).props("flat no-caps")
@@ -262,7 +280,7 @@ class _Publish:
 
     def _fill(self) -> None:
         try:
-            self._text.set_value(form_of(self._system.node.context.types.message(self._type.value)))
+            self._form.show(self._system.node.context.types.message(self._type.value))
         except (RoszError, ValueError) as error:
             ui.notify(str(error), type="negative")
 
@@ -275,14 +293,14 @@ class _Publish:
         return self._sending
 
     async def _send(self) -> None:
-        text = self._text.value
+        text = self._form.text
         await self._frame.attempt(lambda: self._open().send(text), f"published {self._topic.value}")
 
     async def _toggle(self) -> None:
         if self._sending is not None and self._sending.repeats:
             self._sending.stop()
         else:
-            text, rate = self._text.value, min(_FASTEST, max(0.01, float(self._rate.value or 1)))
+            text, rate = self._form.text, min(_FASTEST, max(0.01, float(self._rate.value or 1)))
             await self._frame.attempt(lambda: self._open().repeat(text, rate))
         self._count()
 
