@@ -17,6 +17,8 @@ _BATCH = 50
 _BATCHES = 40
 """Batches that wait at most: some seconds of most robots, and memory for 2000 messages."""
 _BYTES = 64 << 20
+_FILL_TIMEOUT = 0.2
+"""Time to wait for a slow disk, which leaves the processor to others."""
 
 
 class ReadAhead(Generic[T]):
@@ -33,6 +35,7 @@ class ReadAhead(Generic[T]):
         self._changed = threading.Condition()
         self._ready: deque[tuple[int, list[T]]] = deque()
         self._size = 0
+        self._full = False
         self._ended = False
         self._error: Exception | None = None
         start_thread(threading.Thread(target=self._run, name="rosz-read-ahead", daemon=True))
@@ -57,17 +60,23 @@ class ReadAhead(Generic[T]):
 
     def _put(self, size: int, batch: list[T]) -> bool:
         with self._changed:
-            self._changed.wait_for(
-                lambda: (
-                    self._ended
-                    or not self._ready
-                    or (len(self._ready) < _BATCHES and self._size + size <= _BYTES)
-                )
-            )
+            if not self._has_room(size):
+                self._full = True
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._ended or self._has_room(size))
             self._ready.append((size, batch))
             self._size += size
             self._changed.notify_all()
             return not self._ended
+
+    def _has_room(self, size: int) -> bool:
+        waiting = self._size + size
+        return not self._ready or (len(self._ready) < _BATCHES and waiting <= _BYTES)
+
+    def fill(self) -> None:
+        """Wait until the thread has made all that may wait, as it takes the processor meanwhile."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._full or self._ended, _FILL_TIMEOUT)
 
     def __iter__(self) -> Iterator[list[T]]:
         while True:

@@ -323,6 +323,7 @@ class Player:
             return
         items = ((len(item[2]), item) for item in map(self._convert, entries) if item)
         with ReadAhead(items) as ahead:
+            ahead.fill()
             batches = iter(ahead)
             some = next(batches, [])
             # Making the publishers, waiting and reading so far do not count as time of the bag.

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from network import TIMEOUT, Network, eventually
 
 import rosz.bags
 from rosz.bags import Channel, open_reader
+from rosz.bags.ahead import ReadAhead
 from rosz.bags.player import Player, PlayOptions, Progress
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import PointStamped
@@ -68,6 +69,27 @@ def _player(network: Network, *paths: Path, **options: Any) -> Player:
     player.warnings = warnings  # type: ignore[attr-defined]
     player.advertise()
     return player
+
+
+def test_reading_ahead_is_done_before_the_first_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It does not take the processor while the first messages are due."""
+    monkeypatch.setattr("rosz.bags.ahead._FILL_TIMEOUT", TIMEOUT)
+    made: list[int] = []
+
+    def make() -> Iterator[tuple[int, int]]:
+        for number in range(10_000):
+            made.append(number)
+            yield 1, number
+
+    with ReadAhead(make()) as ahead:
+        ahead.fill()
+        before = len(made)
+        assert before > 2000
+        assert next(iter(ahead)) == list(range(50))
+        eventually(lambda: len(made) > before)
+    with ReadAhead(iter([(1, "a")])) as short:
+        short.fill()
+        assert list(short) == [["a"]]
 
 
 def test_messages_come_in_order_at_their_times(network: Network, tmp_path: Path) -> None:

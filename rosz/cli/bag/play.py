@@ -24,7 +24,7 @@ __all__ = ("list_topics",)
 _TOOL = "play"
 _LISTS = ("--topics", "--pause-topics")
 _FASTER = 1.1
-_SWITCH_SECONDS = 0.0005
+_SWITCH_SECONDS = 0.0001
 """The thread that reads ahead must not keep the one that publishes waiting for longer."""
 _DEFAULT_CLOCK = 100.0
 
