@@ -159,6 +159,11 @@ class Player:
         self._tick: Callable[[int], None] | None = None
         self._controlled = self._start  # the latest stamp of the topic that controls the rate
         self._topics = self._chosen_topics()
+        if self._start > last:
+            self._warn(
+                f"nothing to play: --start {options.start:g} is behind the end of the bags, which"
+                f" have {(last - first) / _NS:.1f} s"
+            )
 
     def _chosen_topics(self) -> set[str]:
         known = {channel.topic for one in self._readers for channel in one.channels}

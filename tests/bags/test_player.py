@@ -130,6 +130,10 @@ def test_a_part_of_some_topics_under_a_prefix(network: Network, tmp_path: Path) 
     player.run()
     heard.wait(5)
     assert [(one[0], one[1].data) for one in heard.found] == [("/old/a", n) for n in range(5, 10)]
+    late: Any = _player(network, bag, wait_for_subscribers=False, start=9.0)
+    assert late.warnings == [
+        "nothing to play: --start 9 is behind the end of the bags, which have 0.2 s"
+    ]
 
 
 def test_remapping_renames_topics(network: Network, tmp_path: Path) -> None:

@@ -310,7 +310,7 @@ def talker(network: Network, topic: str = "/chatter") -> Publisher[Any]:
 
 
 def test_the_command(network: Network) -> None:
-    talker(network)
+    publisher = talker(network)
     assert record(network, "/chatter", "-l", "1", "-O", "one").exit_code() == 0
     with rosz_bag(network.folder / "one.mcap") as bag:
         assert [entry.message.data for entry in bag.messages("/chatter")] == ["hello"]
@@ -320,11 +320,15 @@ def test_the_command(network: Network) -> None:
 
     dated = record(network, "-e", "/chat.*", "-x", "/rosout", "-o", "lab", "--zstd")
     dated.wait_for("Subscribing to /chatter")
+    publisher.wait_for_subscribers(timeout=TIMEOUT)
     dated.send(signal.SIGINT)
+    while dated.process.poll() is None:  # what comes before the end is counted, too
+        publisher.publish(String(data="hello"))
     assert dated.exit_code() == 0
     (path,) = network.folder.glob("lab_????-??-??-??-??-??.mcap")
     with open_reader(path) as reader:
         assert not reader.problems
+        assert dated.lines[-1].startswith(f"{reader.count()} messages in ")
 
 
 def test_the_duration_ends_a_bag_without_messages(network: Network) -> None:
@@ -369,8 +373,10 @@ def test_recorders_that_are_killed(network: Network, seed: int) -> None:
         program.wait_for("Subscribing to /chatter")
     publisher.wait_for_subscribers(RECORDERS, timeout=TIMEOUT)
     moments = sorted(rng.uniform(0.1, 2.0) for _ in recorders)
-    begun, times, ends = time.monotonic(), [], []
-    readable = []
+    times: list[float] = []
+    ends: list[float] = []
+    readable: list[list[int]] = []
+    begun = time.monotonic()
     while len(ends) < RECORDERS:
         publisher.publish(String(data=str(len(times))))
         times.append(time.monotonic())

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from rosz.bags import Compression
+    from rosz.bags.parameters import ParameterRecord
     from rosz.bags.recorder import Recorder
     from rosz.bags.recording import BagFiles, RecordOptions, Selection, Sink
     from rosz.node import Node
@@ -193,7 +194,7 @@ def _record(
         recorder = stack.enter_context(
             Recorder(node, selection, files, report, limit, ended, buffer=options.buffer)
         )
-        _run(node, recorder, files, options, report, finished=files.finished)
+        _run(node, recorder, parameters, files, options, report, finished=files.finished)
         if recorder.error is not None:
             raise recorder.error
 
@@ -248,7 +249,7 @@ def _keep_last(
                 except BagError as error:  # the next one may succeed
                     print_error(f"ERROR: {error}")
 
-        _run(node, recorder, ring, options, report, finished=recorder.ended, look=look)
+        _run(node, recorder, parameters, ring, options, report, finished=recorder.ended, look=look)
 
 
 @contextmanager
@@ -293,6 +294,7 @@ def _end_by_signal() -> Iterator[threading.Event]:
 def _run(
     node: Node,
     recorder: Recorder,
+    parameters: ParameterRecord,
     sink: Sink,
     options: RecordOptions,
     report: Callable[[str], None],
@@ -315,6 +317,8 @@ def _run(
     finally:
         if shown:
             progress.end()
+        recorder.close()
+        parameters.close()
         lost = recorder.lost + (0 if recorder.error is None else sink.unwritten)
         seconds = time.monotonic() - begun
         report(f"{sink.count} messages in {seconds:.1f} s, {lost} lost")
