@@ -23,6 +23,8 @@ class BridgedNode(NodeCore):
         name: Full name.
         terminate: Function that asks the node to end, for a reason.
         number: Number of the node within the session; by default one that was never used.
+        started: Time of its start that its token tells, as that of the node that had the number
+            before; now by default.
 
     Raises:
         InvalidName: The name is not legal.
@@ -35,11 +37,12 @@ class BridgedNode(NodeCore):
         name: str,
         terminate: Callable[[str], object],
         number: int | None = None,
+        started: int | None = None,
     ) -> None:
         self._terminate = terminate
         namespace = names.namespace(name).rstrip("/") or "/"
         base = names.basename(name)
-        super().__init__(base, namespace=namespace, context=context, number=number)
+        super().__init__(base, namespace=namespace, context=context, number=number, started=started)
         serve_control(self)
         yield_to_newer(self)
         self._announce()

@@ -60,6 +60,7 @@ class NodeCore:
         context: Context | None = None,
         argv: Sequence[str] | None = None,
         number: int | None = None,
+        started: int | None = None,
     ) -> None:
         self._owns_context = context is None
         self.program: Program | None = current()
@@ -70,13 +71,15 @@ class NodeCore:
         self.context: Context = context or Context(argv=sys.argv[1:] if argv is None else argv)
         self._params: Params | None = None
         try:
-            self._identify(name, namespace, number)
+            self._identify(name, namespace, number, started)
         except BaseException:
             if self._owns_context:
                 self.context.close()
             raise
 
-    def _identify(self, name: str, namespace: str | None, number: int | None) -> None:
+    def _identify(
+        self, name: str, namespace: str | None, number: int | None, started: int | None
+    ) -> None:
         context = self.context
         environment, arguments = context.environment, context.arguments
         default = environment.namespace if namespace is None else namespace
@@ -90,7 +93,7 @@ class NodeCore:
             context.domain,
             context.session.zid,
             self.node_id,
-            context.session.stamp().time,
+            context.session.stamp().time if started is None else started,
             os.getpid(),
             socket.gethostname(),
             self.name,

@@ -74,6 +74,7 @@ class Subscription(Entity, Generic[M]):
         warn_dropped: Whether the first sample that is dropped is logged.
         fit: Function that returns how many samples of a size in bytes may wait for the callback,
             where these are fewer than the depth; only without a message type.
+        number: Number of the subscription within the session; by default one that was never used.
 
     Attributes:
         message_type: As given.
@@ -93,11 +94,12 @@ class Subscription(Entity, Generic[M]):
         with_info: bool = False,
         warn_dropped: bool = True,
         fit: Callable[[int], int] | None = None,
+        number: int | None = None,
     ) -> None:
         name, type_hash = ANY, ANY
         if message_type is not None:
             name, type_hash = message_type._type_name, message_type._type_hash
-        super().__init__(node, Kind.SUBSCRIPTION, topic, name, type_hash, qos)
+        super().__init__(node, Kind.SUBSCRIPTION, topic, name, type_hash, qos, number=number)
         qos = self.qos
         self.message_type = message_type
         self.dropped: int = 0

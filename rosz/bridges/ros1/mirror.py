@@ -145,12 +145,15 @@ class Mirror:
             return
         node = self._nodes.get(entry.node)
         if node is None:
+            identity = self._shared.identity(entry.node, Kind.NODE)
             node = BridgedNode(
                 self._shared.context,
                 self._shared.here(entry.node),
                 partial(self._terminate, entry.node),
-                self._shared.identity(entry.node, Kind.NODE).number,
+                identity.number,
+                identity.started,
             )
+            identity.started = node.process.started
             self._nodes[entry.node] = node
         self._keep(make(self._shared, node, entry))
 

@@ -43,10 +43,12 @@ class Identity(msgspec.Struct):
         number: Number within the session.
         sequence: Sequence number of its last message: receivers know a publisher by its number, and
             take a message for a repetition whose sequence number is not higher.
+        started: Time that the token of the node tells; None before its first start.
     """
 
     number: int
     sequence: int = 0
+    started: int | None = None
 
 
 class Shared:

@@ -373,9 +373,12 @@ class SubscribedTopic:
             return
         own = set() if source != self.entry.name else shared.gids
         link = _Link(shared, self._node, incoming.stream, codec, own, self._drop)
+        kept = f"{self.entry.name} connected"  # not that of what is shown until then
+        identity = shared.identity(self.entry.node, Kind.SUBSCRIPTION, kept)
+        number = None if self._links else identity.number
         self._links.append(link)
         shown, self._shown = self._shown, None
-        link.open(self.entry.name, shared.here(source), publishers, shown)
+        link.open(self.entry.name, shared.here(source), publishers, shown, number)
         if shown is not None:
             shown.close()  # later than the link subscribes, so that publishers see no gap
 
@@ -490,7 +493,12 @@ class _Link:
         self._early: set[tuple[bytes, int]] = set()
 
     def open(
-        self, name: str, topic: str, publishers: list[Token], shown: _Shown | None = None
+        self,
+        name: str,
+        topic: str,
+        publishers: list[Token],
+        shown: _Shown | None = None,
+        number: int | None = None,
     ) -> None:
         """Answer the header, subscribe, and send what was published before.
 
@@ -499,6 +507,7 @@ class _Link:
             topic: Name of the topic on the network.
             publishers: Its publishers there.
             shown: The subscription that has kept messages until now, if there was one.
+            number: Number of the subscription within the session; None for a new one.
         """
         codec, stream = self._codec, self.stream
         latched = any(token.qos is not None and token.qos.latched for token in publishers)
@@ -522,6 +531,7 @@ class _Link:
                 for_queue(max(_QUEUE, depth)),
                 raw=True,
                 with_info=True,
+                number=number,
             )
             self._subscription = self._node.keep(subscription)
             if shown is not None and shown.key == subscription.key:
