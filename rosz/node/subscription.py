@@ -25,7 +25,7 @@ from rosz.node.core import NodeCore
 from rosz.node.decoder import AnySample, Decoder, Received
 from rosz.node.entity import ANY, Entity
 from rosz.node.fetch import FetchedSample, Fetcher
-from rosz.node.local_delivery import LocalReceiver
+from rosz.node.local_delivery import LocalReceiver, LocalSample
 from rosz.program import within
 from rosz.qos import QoS
 from rosz.session import LONGEST_WAIT, Reply, clamp_timeout
@@ -50,6 +50,9 @@ _HISTORY_TIMEOUT = 10.0
 _LIVE_SECONDS = 1.0
 """Seconds that a replayed sample waits at most for the live ones that it may overtake."""
 _POLL_SECONDS = 0.005
+_YIELD_SECONDS = 0.0001
+_YIELD_AFTER = 100
+"""Messages after which a publisher of the same process yields at most."""
 
 
 _Item = tuple[AnySample, Decoder | None]
@@ -112,6 +115,8 @@ class Subscription(Entity, Generic[M]):
         self._queue = _Queue(self._depth)
         self._queue_worker: Worker[_Item] | None = None
         self._turn = threading.RLock()
+        self._unyielding = 0
+        self._turn_after = max(self._depth, _YIELD_AFTER)
         self._opened = time.time_ns()
         self._learning = threading.RLock()  # a signal handler may come in between
         self._decoder = None
@@ -139,7 +144,7 @@ class Subscription(Entity, Generic[M]):
         """Receive what nodes of this process publish, where that does not use the session."""
         local = self.node.context.local_delivery
         if local is not None:
-            receiver = LocalReceiver(self.matches, self._receive, self._expect_replay)
+            receiver = LocalReceiver(self.matches, self._receive_message, self._expect_replay)
             self.keep(local.register(self.name, receiver))
 
     def _expect_replay(self, publisher: bytes) -> None:
@@ -195,6 +200,21 @@ class Subscription(Entity, Generic[M]):
                         self._dispatch_queued,
                         receive=self._queue.receive,
                     )
+
+    def _receive_message(self, sample: LocalSample) -> None:
+        """Put a message of this process into the queue.
+
+        Python runs one thread at a time, for 5 ms: a publisher that fills the queue within these
+        lets the callbacks have their turn, instead of displacing what they have not taken.
+        """
+        self._unyielding += 1
+        if self._unyielding >= self._turn_after and len(self._queue.items) >= self._depth:
+            self._unyielding = 0
+            time.sleep(_YIELD_SECONDS)
+        if self._queue_worker is None:
+            self._receive(sample)
+        else:
+            self._queue.put((sample, None))
 
     def _dispatch_queued(self, item: _Item) -> None:
         if isinstance(item[0], Reply) and item[1] is not None:
@@ -493,7 +513,8 @@ class _Queue:
     def put(self, item: _Item) -> None:
         """Add an item; neither blocks nor raises."""
         self.items.append(item)
-        self.wake()
+        if self._notifier.locked() or self._wakers:
+            self.wake()
 
     def wake(self) -> None:
         """Wake one waiter, and all event loops."""

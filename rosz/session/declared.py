@@ -343,10 +343,12 @@ class RawPublisher(Declared):
         changes = self._changes or self._watch()
         if self._closed or ENDING.is_set():
             raise ClosedError(f"cannot look for subscribers of '{self.key}': it is closed")
-        with suppress(zenoh.ZError):  # it is being closed
+        try:
             change = changes()
-            if change is not None:
-                self._matched = bool(change.matching)
+        except zenoh.ZError:  # it is being closed
+            change = None
+        if change is not None:
+            self._matched = bool(change.matching)
         return self._matched
 
     def _watch(self) -> Callable[[], Any]:

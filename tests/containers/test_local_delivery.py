@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from queue import SimpleQueue
 from typing import Any
 
@@ -12,7 +13,7 @@ from network import Network, eventually
 from rosz.errors import EncodeError
 from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import String
-from rosz.node import Context, LocalDelivery, Node
+from rosz.node import Context, LocalDelivery, Node, subscription
 
 
 @pytest.fixture
@@ -110,3 +111,50 @@ def test_a_callback_that_blocks_holds_nobody_up(context: Context) -> None:
     assert quick.get(timeout=10).width == 0
     release.set()
     eventually(lambda: slow.dropped == 7)
+
+
+class _Clock:
+    """The module time, which counts how often a thread sleeps.
+
+    Args:
+        thread: The thread.
+    """
+
+    def __init__(self, thread: threading.Thread) -> None:
+        self.sleeps = 0
+        self._thread = thread
+
+    def sleep(self, seconds: float) -> None:
+        if threading.current_thread() is self._thread:
+            self.sleeps += 1
+        time.sleep(seconds)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(time, name)
+
+
+def test_a_publisher_lets_callbacks_take_what_fills_the_queue(
+    context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = _Clock(threading.current_thread())
+    monkeypatch.setattr(subscription, "time", clock)
+    began, go_on, came = threading.Event(), threading.Event(), SimpleQueue[str]()
+
+    def callback(message: String) -> None:
+        began.set()
+        go_on.wait(60)
+        came.put(message.data)
+
+    Node("slow", context=context).subscription("topic", String, callback, queue_size=100)
+    publisher = Node("fast", context=context).publisher("topic", String)
+    publisher.publish(data="first")
+    assert began.wait(10)
+    for number in range(99):
+        publisher.publish(data=str(number))
+    assert clock.sleeps == 0  # there is room for another one
+    for number in range(99, 350):
+        publisher.publish(data=str(number))
+    assert clock.sleeps == 3  # once for each 100 at most
+    go_on.set()
+    assert came.get(timeout=10) == "first"
+    assert [came.get(timeout=10) for _ in range(100)] == [str(number) for number in range(250, 350)]
