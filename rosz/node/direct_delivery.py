@@ -74,7 +74,7 @@ class DirectDelivery:
             if not self._subscribers:
                 # Two, because access rules restrict samples more than announcements.
                 self._subscribers = [
-                    self._session.subscriber(key, self._dispatch)
+                    self._session.subscriber(key, self._dispatch, rare=True)
                     for key in (f"{self._key}/*", announcement_key(f"{self._key}/*"))
                 ]
 

@@ -95,6 +95,7 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
     publisher = network.node("talker").publisher("chatter", String)
     for number in range(1500):
         publisher.publish(str(number))
+    publisher.wait_for_subscribers()  # over the link that `_missing` only pretends to wait for
     linked.set()
     assert subscription.get().data == "500"
     assert publisher.dropped == 500
@@ -113,6 +114,7 @@ def test_bytes_that_are_held_are_bounded(network: Network, monkeypatch: pytest.M
     publisher = network.node("talker").publisher("chatter", String)
     for number in range(20):
         publisher.publish(str(number) + " " * 10_000)
+    publisher.wait_for_subscribers()
     linked.set()
     assert int(subscription.get().data) == publisher.dropped == 11
 
@@ -135,6 +137,7 @@ def test_held_for_as_long_as_links_come(network: Network, monkeypatch: pytest.Mo
     assert talker.context.mesh.ready.wait(TIMEOUT)
     publisher.publish("second")
     assert not subscription._queue.items
+    publisher.wait_for_subscribers()
     linked.set()
     assert [subscription.get().data for _ in range(2)] == ["first", "second"]
 

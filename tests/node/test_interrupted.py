@@ -26,11 +26,11 @@ def test_subscribing(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     subscriber = session.subscriber
     opened: list[int] = []
 
-    def interrupted(*args: Any) -> Any:
+    def interrupted(*args: Any, **options: Any) -> Any:
         if not opened:
             opened.append(1)
             direct.register(1, lambda _: None, lambda _: None)
-        return subscriber(*args)
+        return subscriber(*args, **options)
 
     monkeypatch.setattr(session, "subscriber", interrupted)
     in_time(lambda: direct.register(2, lambda _: None, lambda _: None))
