@@ -8,6 +8,7 @@ layer is put into the order of the mean places of its neighbours, and boxes move
 from __future__ import annotations
 
 import itertools
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
@@ -199,12 +200,10 @@ def _order(layers: list[list[_Vertex]]) -> None:
             break
         forth = sweep % 2 == 0
         for layer in layers if forth else reversed(layers):
-            wanted = {
-                one: _mean(
-                    (other.order for other in (one.before if forth else one.after)), one.order
-                )
-                for one in layer
-            }
+            wanted = {}
+            for one in layer:
+                near = one.before if forth else one.after
+                wanted[one] = _mean([other.order for other in near]) if near else one.order
             layer.sort(key=wanted.__getitem__)
             _number(layer)
         found = _crossings(layers)
@@ -220,39 +219,32 @@ def _number(layer: Iterable[_Vertex]) -> None:
         one.order = float(number)
 
 
-def _mean(values: Iterable[float], default: float) -> float:
-    found = list(values)
-    return sum(found) / len(found) if found else default
+def _mean(values: Sequence[float]) -> float:
+    return values[0] if len(values) == 1 else sum(values) / len(values)
 
 
 def _crossings(layers: Iterable[list[_Vertex]]) -> int:
     """Return how often edges cross."""
     total = 0
     for layer in layers:
-        ends = [other.order for one in layer for other in sorted(one.after, key=_by_order)]
+        ends: list[float] = []
+        for one in layer:
+            if len(one.after) == 1:  # as all bends
+                ends.append(one.after[0].order)
+            else:
+                ends += sorted([other.order for other in one.after])
         total += _inversions(ends)
     return total
 
 
-def _by_order(vertex: _Vertex) -> float:
-    return vertex.order
-
-
-def _inversions(values: Sequence[float]) -> int:
-    """Return how many pairs are in the wrong order, by a binary indexed tree."""
-    size = int(max(values, default=0)) + 1
-    tree = [0] * (size + 1)
+def _inversions(values: Iterable[float]) -> int:
+    """Return how many pairs are in the wrong order."""
     total = 0
-    for seen, value in enumerate(values):
-        index, not_above = int(value) + 1, 0
-        while index:
-            not_above += tree[index]
-            index -= index & -index
-        total += seen - not_above
-        index = int(value) + 1
-        while index <= size:
-            tree[index] += 1
-            index += index & -index
+    seen: list[float] = []
+    for value in values:
+        position = bisect_right(seen, value)
+        total += len(seen) - position
+        seen.insert(position, value)
     return total
 
 
@@ -266,18 +258,10 @@ def _place(layers: list[list[_Vertex]]) -> None:
     for sweep in range(_PLACE_SWEEPS):
         forth = sweep % 2 == 0
         for layer in layers if forth else reversed(layers):
-            wanted = [
-                _mean(
-                    (
-                        other.y
-                        for other in (
-                            (one.before if forth else one.after) or one.after or one.before
-                        )
-                    ),
-                    one.y,
-                )
-                for one in layer
-            ]
+            wanted = []
+            for one in layer:
+                near = (one.before if forth else one.after) or one.after or one.before
+                wanted.append(_mean([other.y for other in near]) if near else one.y)
             _spread(layer, wanted)
 
 

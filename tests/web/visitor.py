@@ -65,6 +65,11 @@ class Visitor:
         while text not in self._events.get(timeout=_LONG):
             pass
 
+    def count(self, text: str) -> int:
+        """Return how many messages with a text have come that nobody has waited for."""
+        waiting = [self._events.get() for _ in range(self._events.qsize())]
+        return sum(text in one for one in waiting)
+
     def close(self) -> None:
         """Close the page."""
         self._stack.close()
