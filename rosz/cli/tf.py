@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli.call import Call, new_group
-from rosz.cli.console import print_json, print_json_line, print_lines, print_result
+from rosz.cli.console import print_json, print_json_line, print_lines, print_result, warn
 from rosz.cli.declare import Argument, Json, Option, at_least, per_second, seconds, values_last
 from rosz.errors import TransformError
 
@@ -19,6 +19,9 @@ __all__ = ("app",)
 app = new_group("List, print, watch and publish transforms.")
 
 _TOOL = "rosz_tf"
+_TOLD_AFTER = 2_000_000_000
+"""Nanoseconds after which it is told what the command waits for."""
+
 _Wait = Annotated[float, Option("--wait SECONDS", "How long to listen to /tf.")]
 _Target = Annotated[str, Argument("TARGET", "Frame to give coordinates in.")]
 _Source = Annotated[str, Argument("SOURCE", "Frame whose pose is wanted.")]
@@ -92,7 +95,14 @@ def echo_command(
         buffer = Buffer()
         TransformListener(buffer, node)
         limit = round(timeout * 1e9)
-        if not buffer.wait(lambda: not buffer.why_not(target, source), limit, Clock()):
+
+        def known() -> bool:
+            return not buffer.why_not(target, source)
+
+        if limit > _TOLD_AFTER and not buffer.wait(known, _TOLD_AFTER, Clock()):
+            warn(f"waiting for the transform: {buffer.why_not(target, source)}")
+            limit -= _TOLD_AFTER
+        if not buffer.wait(known, limit, Clock()):
             raise TransformError(buffer.why_not(target, source))
         shown = 0
         while True:

@@ -15,6 +15,7 @@ from network import TIMEOUT, Network, Program, eventually
 
 from rosz.errors import UsageError
 from rosz.msgs.geometry_msgs.msg import TransformStamped
+from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.programs.tf import leading_number, parse_transform
 from rosz.qos import QoS
@@ -135,6 +136,16 @@ def test_publish_command_reaches_late_listeners(network: Network) -> None:
     eventually(lambda: not buffer.why_not("map", "camera"), "the transform")
     assert buffer.lookup("map", "camera")[0].translation == (1.0, 2.0, 3.0)
     listener.close()
+
+
+def test_echo_tells_what_it_waits_for(network: Network) -> None:
+    node = network.node("late")
+    program = start(network, "tf", "echo", "-n", "1", "map", "late")
+    program.wait_for("waiting for the transform: canTransform: target_frame map does not exist.")
+    pose = TransformStamped(Header(frame_id="map"), "late")
+    pose.transform.rotation.w = 1.0
+    StaticTransformBroadcaster(node).send(pose)
+    assert program.exit_code() == 0, program.output
 
 
 def test_the_program_of_tf_dates_ahead(network: Network) -> None:
