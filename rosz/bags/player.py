@@ -118,6 +118,7 @@ class Player:
     Attributes:
         problems: Number of problems.
         published: Number of messages that were published.
+        loop: Whether to begin again at the end.
 
     Raises:
         UsageError: The options do not fit each other, or the bags.
@@ -138,6 +139,7 @@ class Player:
         self._report = report
         self.problems: int = 0
         self.published: int = 0
+        self.loop: bool = options.loop
         counted = [one for one in readers if one.count()]
         first = min((one.start for one in counted), default=0)
         last = max((one.end for one in counted), default=0)
@@ -147,6 +149,7 @@ class Player:
             self._end = min(last, self._start + int(options.duration * _NS))
         self._changed = threading.Condition()
         self._steps = 0
+        self._target: int | None = None  # where to go on, in place of the next message
         self._pace = Pace(self._start, options.rate, paused=options.paused)
         self._next_report = 0.0
         self._next_tick = 0.0
@@ -200,8 +203,22 @@ class Player:
 
     def change_rate(self, factor: float) -> None:
         """Play faster or more slowly."""
+        self.set_rate(self._pace.rate * factor)
+
+    def set_rate(self, rate: float) -> None:
+        """Play at a rate, in seconds of the bag per second."""
         with self._changed:
-            self._pace.rate = self._pace.rate * factor
+            self._pace.rate = rate
+            self._changed.notify_all()
+
+    def jump(self, elapsed: float) -> None:
+        """Go on from another place, in seconds since the start; a pause stays one.
+
+        Latched messages from before that place are published first.
+        """
+        with self._changed:
+            self._target = min(max(self._start, self._start + int(elapsed * _NS)), self._end)
+            self._steps = 0
             self._changed.notify_all()
 
     def stop(self) -> None:
@@ -309,19 +326,31 @@ class Player:
         """
         withdraw = self._node.context.on_shutdown(lambda _: self.stop())
         try:
-            self._publish_latched()
+            self._publish_latched(self._start)
+            begin = self._start
             while not self._closed:
-                self._play()
-                if not self._options.loop:
+                self._play(begin)
+                with self._changed:
+                    target, self._target = self._target, None
+                if target is not None:
+                    begin = target
+                    self._publish_latched(begin)
+                elif self.loop:
+                    begin = self._start
+                else:
                     break
-                self._last = self._controlled = self._start
+                self._last = self._controlled = begin
             while self._options.keep_alive and not self._closed:
                 self._wait(_LOOK_SECONDS)
         finally:
             withdraw()
 
-    def _play(self) -> None:
-        parts = [self._entries(one, self._start, self._end) for one in self._readers]
+    @property
+    def _interrupted(self) -> bool:
+        return self._closed or self._target is not None
+
+    def _play(self, begin: int) -> None:
+        parts = [self._entries(one, begin, self._end) for one in self._readers]
         entries = parts[0] if len(parts) == 1 else heapq.merge(*parts, key=lambda one: one.stamp)
         if self._options.immediate:
             self._play_at_once(entries)
@@ -332,7 +361,7 @@ class Player:
             batches = iter(ahead)
             some = next(batches, [])
             # Making the publishers, waiting and reading so far do not count as time of the bag.
-            self._pace.jump(self._start)
+            self._pace.jump(begin)
             for batch in chain((some,), batches):
                 if not self._publish(batch):
                     return
@@ -346,7 +375,7 @@ class Player:
                 self._publish(item for item in map(self._convert, some) if item)
             else:
                 self._rush(some)
-            if self._closed:
+            if self._interrupted:
                 return
             if time.monotonic() >= self._next_report:
                 self._look()
@@ -408,13 +437,13 @@ class Player:
     def _publish(self, items: Iterable[_Item]) -> bool:
         """Publish messages when they are due; return False at the end of the node."""
         for item in items:
-            if not self._await(item[0], item[1].name) or self._closed:
+            if not self._await(item[0], item[1].name) or self._interrupted:
                 return False
             self._send(item)
             self._last = item[0]
             if not self.published & 255 and time.monotonic() >= self._next_report:
                 self._look()
-        return not self._closed
+        return not self._interrupted
 
     def _send(self, item: _Item) -> None:
         try:
@@ -424,14 +453,14 @@ class Player:
             self._problem(f"a message of '{item[1].name}' is left out: {error}")
 
     def _await(self, stamp: int, topic: str) -> bool:
-        """Wait until a message is due; return False at the end of the node."""
+        """Wait until a message is due; return False at the end of the node, and to jump."""
         pace, options = self._pace, self._options
         if topic in self._pausing and not pace.paused:
             pace.paused = True
         if options.skip_empty and stamp - self._last > options.skip_empty * _NS:
             pace.jump(stamp)
         ahead = True
-        while not self._closed:
+        while not self._interrupted:
             ahead = ahead and self._is_ahead()
             if ahead:
                 left = _FOREVER
@@ -477,7 +506,7 @@ class Player:
         if time.monotonic() >= self._next_report:
             self._look()
         with self._changed:
-            if not self._closed:
+            if not self._interrupted:
                 self._changed.wait(min(seconds, _LOOK_SECONDS))
 
     def _look(self) -> None:
@@ -497,15 +526,15 @@ class Player:
 
     # What is latched.
 
-    def _publish_latched(self) -> None:
-        """Publish latched messages from before the start.
+    def _publish_latched(self, begin: int) -> None:
+        """Publish latched messages from before a stamp.
 
         With a pause at the start, those that were published before the bag began are such, too.
         """
-        early = self._options.paused and not self._options.start
+        early = self._options.paused and not self._options.start and begin == self._start
         for reader in self._readers:
             latched = [one for one in reader.channels if one.latched and one.topic in self._topics]
-            end = self._start + _RECENT if early else self._start - 1
+            end = begin + _RECENT if early else begin - 1
             if not latched or end < reader.start:
                 continue
             for entry in reversed(list(self._last_messages(reader, latched, end))):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Annotated
 
 from rosz.cli.console import print_lines, until_stopped, warn
@@ -29,6 +30,7 @@ def web_command(
         str, Option("--password-file FILE", "File whose first line opens the page.")
     ] = "",
     read_only: Annotated[bool, Option("--read-only", "Let the page change nothing.")] = False,
+    bags: Annotated[str, Option("--bags FOLDER", "Folder of the bags, instead of this one.")] = ".",
     certificate: Annotated[str, Option("--certificate FILE", "Certificate for TLS.")] = "",
     key: Annotated[str, Option("--key FILE", "Private key of the certificate.")] = "",
 ) -> None:
@@ -47,6 +49,7 @@ def web_command(
         read_only=read_only,
         certificate=certificate,
         key=key,
+        bags=Path(bags),
     )
     with until_stopped() as ready, ExitStack() as stack:
         node = stack.enter_context(Node("rosz_web", anonymous=True, argv=()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosz.bridges.admission import is_loopback
@@ -24,9 +25,14 @@ _LIBRARY = "the page needs a library: pip install 'rosz[web]'"
 
 
 class Settings(ServerSettings, frozen=True, kw_only=True):
-    """Settings of the page."""
+    """Settings of the page.
+
+    Attributes:
+        bags: Folder of the bags that it records, plays and shows.
+    """
 
     port: int = PORT
+    bags: Path = Path()
 
 
 def open_page(node: Node, settings: Settings) -> tuple[PageServer, list[str]]:
@@ -40,6 +46,8 @@ def open_page(node: Node, settings: Settings) -> tuple[PageServer, list[str]]:
         TransportError: It cannot listen there.
         UsageError: A setting is not valid, or the library is not installed.
     """
+    if not settings.bags.is_dir():
+        raise UsageError(f"--bags: '{settings.bags}' is not a folder")
     access = grant_access(node, settings, HOLDER)
     if importlib.util.find_spec("nicegui") is None:
         raise UsageError(_LIBRARY)
@@ -50,6 +58,7 @@ def open_page(node: Node, settings: Settings) -> tuple[PageServer, list[str]]:
         settings.host,
         settings.port,
         permission=Permission(access.permit, settings.read_only),
+        bags=settings.bags,
         guard=Guard(
             access.password, local=is_loopback(settings.host), secure=access.tls is not None
         ),

@@ -11,6 +11,7 @@ import socket
 import ssl
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import uvicorn
@@ -60,6 +61,7 @@ class PageServer:
         port: Port to listen at; 0 for any.
         permission: What the page may change.
         guard: Who may open it.
+        bags: Folder of the bags.
         tls: Settings of TLS; without them, links are not encrypted.
 
     Attributes:
@@ -77,11 +79,12 @@ class PageServer:
         *,
         permission: Permission,
         guard: Guard,
+        bags: Path,
         tls: ssl.SSLContext | None = None,
     ) -> None:
         self._socket = _listen(host, port)
         self.port: int = self._socket.getsockname()[1]
-        add_pages(System(node, permission))
+        add_pages(System(node, permission, bags))
         app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         ui.run_with(
             app,

@@ -207,6 +207,35 @@ def test_a_pause_steps_and_goes_on(network: Network, tmp_path: Path) -> None:
     assert heard.values == [1, 1, 2, 10, 11, 12]
 
 
+def test_a_jump_goes_on_from_another_place(network: Network, tmp_path: Path) -> None:
+    bag = _bag(tmp_path / "a.mcap", [("/a", n, Int32(data=n)) for n in range(11)])
+    heard = _Listener(network, "/a")
+    player = _player(network, bag, paused=True)
+    running = network.thread(player.run)
+    for count, place in enumerate((5, 2, 0, 8), 1):
+        player.jump(place)
+        player.step()
+        heard.wait(count)
+    assert heard.values == [5, 2, 0, 8]
+    player.set_rate(100)
+    player.toggle()
+    running.join(TIMEOUT)
+    heard.wait(6)
+    assert heard.values == [5, 2, 0, 8, 9, 10]
+
+
+def test_playing_begins_again_as_long_as_it_shall(network: Network, tmp_path: Path) -> None:
+    bag = _bag(tmp_path / "a.mcap", [("/a", n / 100, Int32(data=n)) for n in range(3)])
+    heard = _Listener(network, "/a")
+    player = _player(network, bag, loop=True)
+    running = network.thread(player.run)
+    heard.wait(7)
+    player.loop = False
+    running.join(TIMEOUT)
+    assert player.published % 3 == 0
+    heard.wait(player.published)
+
+
 def test_the_clock_runs_with_the_bag(network: Network, tmp_path: Path) -> None:
     bag = _bag(tmp_path / "a.mcap", [("/a", n / 10, Int32(data=n)) for n in range(11)])
     clock = _Listener(network, "/clock", kind=Clock)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from network import Network, eventually
 
+from rosz.msgs.std_msgs.msg import String
 from rosz.reconfigure import Client
 from rosz.web.pages.layout import ENTRIES
 
@@ -25,13 +26,16 @@ def world() -> Iterator[World]:
         with open_browser() as browser:
             robot = network.program(ROBOT)
             robot.wait_for("ready", LONG)
-            server = network.run("-m", "rosz", "web", "--port", "0")
+            bags = network.folder / "bags"
+            bags.mkdir()
+            server = network.run("-m", "rosz", "web", "--port", "0", "--bags", str(bags))
             yield World(network, robot, server, browser)
     finally:
         network.close()
 
 
 SEEN = {
+    "/bags": ("Record", "Choose a bag to see what is in it", "Compression"),
     "/actions": ("/count", "example_interfaces/Fibonacci", "order"),
     "/": ("/chatter", "/robot", "std_msgs/String", "Hz"),
     "/graph": ("/chatter", "/robot", "20 Hz"),
@@ -223,6 +227,56 @@ def test_a_goal_is_sent_followed_and_canceled(
     world.should_see("Send goal")
     world.click("Cancel")
     world.should_see("canceled")
+    assert world.messages() == []
+
+
+def test_a_bag_is_recorded_and_played(
+    world: World, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.getbasetemp() / "artefacts"
+    set_screen(world.browser, "laptop", "light")
+    world.open("/bags")
+    world.should_see("No bag is in this folder yet")
+    world.fill("input[aria-label=Name]", "run")
+    world.click("Record")
+    world.should_see("run.mcap", "Disk left")
+    world.browser.get("about:blank")  # the recording goes on
+    world.open("/bags")
+    eventually(lambda: re.search(r"Messages\s+\d\d", world.text), "messages", LONG)
+    take_picture(world.browser, folder, "recording-laptop-light")
+    world.click("Stop")
+    bag = world.network.folder / "bags" / "run.mcap"
+    eventually(bag.exists, "the finished bag", LONG)
+    world.open("/bags?bag=run.mcap")
+    world.should_see("Download", "/chatter", "std_msgs/String")
+    size = "return fetch('/bag/run.mcap').then((got) => got.blob()).then((got) => got.size)"
+    assert world.browser.execute_script(size) == bag.stat().st_size
+    switch = (
+        "[...document.querySelectorAll('.q-toggle')].findLast((one) => one.innerText === 'Loop')"
+    )
+    world.browser.execute_script(f"{switch}.click()")
+    eventually(
+        lambda: world.browser.execute_script(f"return {switch}.ariaChecked === 'true'"),
+        "Loop",
+        LONG,
+    )
+    world.fill("input[aria-label=Prefix]", "/old")
+    heard: list[str] = []
+    world.network.node("ear").subscription(
+        "/old/chatter", String, lambda one: heard.append(one.data)
+    )
+    world.click("Play")
+    world.should_see("Playing")
+    eventually(lambda: heard, "a message of the bag", LONG)
+    for screen, theme in (*THEMES, ("laptop", "dark"), ("phone", "light")):
+        set_screen(world.browser, screen, theme)
+        take_picture(world.browser, folder, f"bag-{screen}-{theme}")
+    world.browser.execute_script("document.querySelector('[aria-label=Stop]').click()")
+    eventually(lambda: "Playing" not in world.text, "the end of playing", LONG)
+    world.click("Delete")
+    world.should_see("It cannot be brought back.")
+    world.click("Delete it")
+    world.should_see("'run.mcap' is deleted.")
     assert world.messages() == []
 
 

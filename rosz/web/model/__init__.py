@@ -5,6 +5,8 @@ newest wins. Pages read what they show at their own pace, so that a slow browser
 """
 
 from rosz.web.model.actions import ActionRow, Actions, ActionUse, GoalRow, SentGoal
+from rosz.web.model.bag_orders import BagCommand, BagOrder, BagReport, PlayOrder, RecordOrder
+from rosz.web.model.bags import COMPRESSIONS, BagRow, BagRun, Bags
 from rosz.web.model.calling import call_service, service_type
 from rosz.web.model.console import LogBook
 from rosz.web.model.driving import Driver
@@ -25,10 +27,17 @@ from rosz.web.model.topic import Condition, TopicWatch, message_tree
 from rosz.web.model.traffic import Traffic
 
 __all__ = (
+    "COMPRESSIONS",
     "IMAGE_TYPES",
     "ActionRow",
     "ActionUse",
     "Actions",
+    "BagCommand",
+    "BagOrder",
+    "BagReport",
+    "BagRow",
+    "BagRun",
+    "Bags",
     "Condition",
     "Driver",
     "Findings",
@@ -44,8 +53,10 @@ __all__ = (
     "Parameters",
     "Permission",
     "Pictures",
+    "PlayOrder",
     "Plot",
     "Reconfiguration",
+    "RecordOrder",
     "RunningLaunch",
     "Sending",
     "SentGoal",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import msgspec
 
 from rosz.bridges.gate import Gate, Verb
@@ -10,6 +12,8 @@ from rosz.security import Permit
 
 __all__ = ("Permission",)
 
+_ALL = "/**"
+"""The pattern for all names."""
 _CHANGES = frozenset({"publish", "call", "serve", "set"})
 
 
@@ -48,6 +52,48 @@ class Permission(msgspec.Struct, frozen=True):
     def sees_launches(self) -> bool:
         """Whether the page may see launches and the output of their nodes."""
         return self.permit is None or self.permit.control
+
+    def check_read_only(self, what: str) -> None:
+        """Refuse to change anything where the page is read-only.
+
+        Args:
+            what: What it is about to do, such as ``play bags``.
+
+        Raises:
+            UsageError: It is.
+        """
+        if self.read_only:
+            raise UsageError(f"this page is read-only: it may not {what}")
+
+    def check_files(self, what: str) -> None:
+        """Refuse to write and delete files of this machine, unless the page may.
+
+        Args:
+            what: What it is about to do, such as ``record bags``.
+
+        Raises:
+            UsageError: It may not; the text says why.
+        """
+        self.check_read_only(what)
+        if self.permit is not None and not self.permit.control:
+            raise UsageError(f"the rules of this machine do not let this page {what}")
+
+    def check_topics(self, verb: Verb, names: Sequence[str]) -> None:
+        """Refuse what the page may not do with topics.
+
+        Args:
+            verb: The action.
+            names: Full names of the topics; all if there is none.
+
+        Raises:
+            UsageError: It may not; the text says why.
+        """
+        for name in names:
+            self.check(verb, name)
+        if not names and self.permit is not None and _ALL not in getattr(self.permit, verb):
+            raise UsageError(
+                f"the rules of this machine do not let this page {verb} all topics; choose some"
+            )
 
     def check_control(self, node: str) -> None:
         """Refuse to control a node, unless the page may.

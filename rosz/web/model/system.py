@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosz.introspect.survey import Survey
 from rosz.web.model.actions import Actions
+from rosz.web.model.bags import Bags
 from rosz.web.model.console import LogBook
 from rosz.web.model.findings import Findings
 from rosz.web.model.frames import Frames
@@ -60,6 +62,7 @@ class System:
     Args:
         node: Node of the page. It is not closed with the system.
         permission: What the pages may change.
+        bags: Folder of the bags; the working directory when not given.
 
     Attributes:
         node: Node of the page.
@@ -73,9 +76,10 @@ class System:
         frames: All frames and their transforms.
         pictures: The sources of pictures.
         actions: The goals that pages have sent.
+        bags: The bags of the folder, a recording, and one that plays.
     """
 
-    def __init__(self, node: Node, permission: Permission) -> None:
+    def __init__(self, node: Node, permission: Permission, bags: Path | None = None) -> None:
         self.node = node
         self.permission = permission
         self.graph: Shared[GraphWatch] = Shared(lambda: GraphWatch(node))
@@ -85,6 +89,7 @@ class System:
         self.launches: Shared[Launches] = Shared(lambda: Launches(node, permission))
         self.pictures = Pictures()
         self.actions: Actions = node.keep(Actions(node, permission))
+        self.bags: Bags = node.keep(Bags(bags or Path(), permission))
         self.console: Shared[LogBook] = Shared(lambda: LogBook(node))
         self.parameters: Shared[Parameters] = Shared(lambda: Parameters(node, permission))
 

@@ -63,6 +63,7 @@ ENTRIES = (
     Entry("/reconfigure", "Reconfigure", "settings_input_component"),
     Entry("/services", "Services", "build"),
     Entry("/actions", "Actions", "flag"),
+    Entry("/bags", "Bags", "inventory_2"),
     Entry("/drive", "Drive", "sports_esports"),
 )
 """The pages, in the order of the navigation."""

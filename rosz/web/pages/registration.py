@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from urllib.parse import quote
+
 from fastapi import Response
+from fastapi.responses import FileResponse, StreamingResponse
 from nicegui import app, ui
 
-from rosz.errors import RoszError
+from rosz.errors import NotFoundError, RoszError
 from rosz.web.model import System
 from rosz.web.pages.actions import show_actions
+from rosz.web.pages.bags import show_bags
 from rosz.web.pages.console import Wanted, show_console
 from rosz.web.pages.drive import show_drive
 from rosz.web.pages.graph import show_graph
@@ -31,6 +35,7 @@ def add_pages(system: System) -> None:
     _add_pages_of_nodes(system)
     _add_pages_of_launches(system)
     _add_pictures(system)
+    _add_downloads(system)
 
     @ui.page("/")
     def overview() -> None:
@@ -97,6 +102,10 @@ def _add_pages_of_nodes(system: System) -> None:
     def services(service: str = "") -> None:
         show_services(system, service)
 
+    @ui.page("/bags")
+    def bags(bag: str = "") -> None:
+        show_bags(system, bag)
+
     @ui.page("/actions")
     def actions(action: str = "") -> None:
         show_actions(system, action)
@@ -112,3 +121,22 @@ def _add_pictures(system: System) -> None:
         if found is None:
             return Response("this picture is gone", status_code=404, headers=_FRESH)
         return Response(found[0], media_type=found[1], headers=_FRESH)
+
+
+def _add_downloads(system: System) -> None:
+    @app.get("/bag/{name}")
+    def download(name: str) -> Response:  # a plain function: it runs on another thread
+        try:
+            path, pieces = system.bags.open(name)
+        except NotFoundError as error:
+            return Response(str(error), status_code=404, headers=_FRESH)
+        except RoszError as error:
+            return Response(str(error), status_code=403, headers=_FRESH)
+        if pieces is None:
+            return FileResponse(path, filename=name, headers=_FRESH)
+        attachment = f"attachment; filename*=utf-8''{quote(name)}.tar"
+        return StreamingResponse(
+            pieces,
+            media_type="application/x-tar",
+            headers={**_FRESH, "Content-Disposition": attachment},
+        )

@@ -1,0 +1,106 @@
+"""What the page and its process for bags say to each other; see ``rosz.web.bag_process``."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+__all__ = ("BagCommand", "BagOrder", "BagReport", "PlayOrder", "RecordOrder")
+
+
+class RecordOrder(msgspec.Struct, frozen=True, kw_only=True):
+    """A recording.
+
+    Attributes:
+        name: Name of the bag, with its suffix, in the working directory.
+        topics: Full names of topics; all topics if there is none.
+        exclude: Regular expression of topics that are not recorded.
+        compression: Name of the compression.
+        split_size: Size in bytes at which another bag begins; 0 for none.
+        split_seconds: Seconds after which another bag begins; 0 for none.
+        max_splits: Number of bags to keep; 0 for all.
+    """
+
+    name: str
+    topics: tuple[str, ...] = ()
+    exclude: str = ""
+    compression: Literal["none", "bz2", "lz4", "zstd"] = "none"
+    split_size: int = 0
+    split_seconds: float = 0.0
+    max_splits: int = 0
+
+
+class PlayOrder(msgspec.Struct, frozen=True, kw_only=True):
+    """A bag to play.
+
+    Attributes:
+        name: Name of the bag in the working directory.
+        topics: Names of the topics to play; all if there is none.
+        prefix: Text put before the names of topics.
+        rate: Seconds of the bag per second.
+        loop: Whether to begin again at the end.
+        paused: Whether to begin with a pause.
+        clock: Whether to publish ``/clock``.
+    """
+
+    name: str
+    topics: tuple[str, ...] = ()
+    prefix: str = ""
+    rate: float = 1.0
+    loop: bool = False
+    paused: bool = False
+    clock: bool = False
+
+
+class BagOrder(msgspec.Struct, frozen=True):
+    """The first line: what the process does."""
+
+    record: RecordOrder | None = None
+    play: PlayOrder | None = None
+
+
+class BagCommand(msgspec.Struct, frozen=True):
+    """A further line.
+
+    Attributes:
+        do: What to do.
+        value: Seconds of the bag to jump to, or the rate, or whether to loop.
+    """
+
+    do: Literal["stop", "pause", "step", "jump", "rate", "loop"]
+    value: float = 0.0
+
+
+class BagReport(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A line of the process: how far it is, or something to say.
+
+    Attributes:
+        said: A sentence for the user.
+        fault: Why it failed.
+        path: Name of the bag that is written, or played.
+        seconds: Seconds of recording; seconds of the bag that are played.
+        duration: Seconds of the bag.
+        messages: Number of messages recorded, or published.
+        size: Bytes recorded.
+        lost: Number of messages that were lost.
+        left: Bytes of the disk that are left.
+        topics: Number of topics that are recorded.
+        rate: Seconds of the bag per second.
+        paused: Whether playing stands still.
+        loop: Whether playing begins again at the end.
+    """
+
+    said: str = ""
+    fault: str = ""
+    path: str = ""
+    seconds: float = 0.0
+    duration: float = 0.0
+    messages: int = 0
+    size: int = 0
+    lost: int = 0
+    left: int = 0
+    topics: int = 0
+    rate: float = 1.0
+    paused: bool = False
+    loop: bool = False
