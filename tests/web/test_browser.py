@@ -270,6 +270,8 @@ def test_a_bag_is_recorded_and_played(
     eventually(lambda: heard, "a message of the bag", LONG)
     for screen, theme in (*THEMES, ("laptop", "dark"), ("phone", "light")):
         set_screen(world.browser, screen, theme)
+        world.open("/bags?bag=run.mcap")
+        world.should_see("Playing", "Download")
         take_picture(world.browser, folder, f"bag-{screen}-{theme}")
     world.browser.execute_script("document.querySelector('[aria-label=Stop]').click()")
     eventually(lambda: "Playing" not in world.text, "the end of playing", LONG)

@@ -88,6 +88,7 @@ class _BagsPage:
                 .classes("w-full cursor-pointer")
                 .props("flat dense")
             )
+            self._table.set_visibility(False)
             self._table.on(
                 "row-click",
                 lambda event: self._contents.show(event.args["name"]),
@@ -216,7 +217,7 @@ class _Recorder:
         going = recording is not None and not recording.ended
         self._form.set_visibility(not going)
         self._going.set_visibility(going)
-        _set(self._said, recording.lines[-1] if recording is not None and recording.lines else "")
+        _set(self._said, _said(recording))
         _set(self._fault, recording.fault if recording is not None else "")
         if recording is None:
             return
@@ -447,6 +448,16 @@ class _Contents:
                 ui.label(f"'{name}' is deleted.").classes("rosz-soft")
             address_of("/bags")
             await self._changed()
+
+
+def _said(recording: BagRun | None) -> str:
+    """Return what a recording said last, or how it ended."""
+    if recording is None or recording.fault:
+        return ""
+    if recording.ended:
+        last = recording.last
+        return f"'{last.path}' has {last.messages} messages, {last.lost} lost."
+    return recording.lines[-1] if recording.lines else ""
 
 
 def _number(label: str) -> ui.number:

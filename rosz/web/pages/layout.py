@@ -89,6 +89,7 @@ body.body--dark .q-btn.text-primary, body.body--dark .q-icon.text-primary {
   --q-primary: #9dbcff; }
 body .rosz-nav.rosz-here { background: #2456c81c; color: #2456c8; font-weight: 600; }
 body.body--dark .rosz-nav.rosz-here { background: #6b9bff26; color: #9dbcff; }
+body.body--dark .text-negative { color: #ff8f88 !important; }
 a { color: #2456c8; } body.body--dark a { color: #9dbcff; }
 :focus-visible { outline: 2px solid #6b9bff; outline-offset: 1px; }
 .q-table__card { background: transparent; box-shadow: none; }
