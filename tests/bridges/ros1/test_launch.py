@@ -9,12 +9,15 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
 
 import pytest
 from network import TIMEOUT, Network, Program
 from oracle import PYTHON, is_installed
 
 from rosz.environment import Environment, package_index
+from rosz.msgs.std_msgs.msg import String
 
 from .world import LISTENER, roscpp
 
@@ -29,6 +32,9 @@ _LAUNCH = """<launch>
   <node pkg="course" type="partner" name="last" args="server" required="true"/>
 </launch>
 """
+_MANIFEST = """<package format="2"><name>{}</name><version>1.0.0</version>
+<description>x</description><maintainer email="me@example.com">x</maintainer>
+<license>BSD</license>{}</package>"""
 _WRAPPERS = {
     "compiled": '#!/bin/sh\nrosrun course partner listener "$@"\n',
     "scripted": '#!/bin/sh\nexec "$(dirname "$0")/listener.py" x chatter "$@"\n',
@@ -39,10 +45,7 @@ def _workspace(top: Path, program: str) -> Path:
     """Write a workspace of catkin with a package whose program is in the devel space."""
     package, devel = top / "src" / "course", top / "devel"
     package.mkdir(parents=True)
-    manifest = """<package format="2"><name>course</name><version>1.0.0</version>
-<description>x</description><maintainer email="me@example.com">x</maintainer>
-<license>BSD</license></package>"""
-    (package / "package.xml").write_text(manifest)
+    (package / "package.xml").write_text(_MANIFEST.format("course", ""))
     (package / "both.launch").write_text(_LAUNCH)
     scripts = {"listener.py": f"#!/usr/bin/env python3\n{LISTENER}", **_WRAPPERS}
     for name, text in scripts.items():
@@ -84,6 +87,55 @@ def test_programs_and_wrappers_of_them_get_their_master(network: Network, tmp_pa
     os.kill(_pid(launch, "last"), signal.SIGKILL)
     assert launch.exit_code() == 1
     assert "REQUIRED process [last-" in launch.output
+
+
+_HEADERS = [Path("/usr/include") / part for part in ("pluginlib", "class_loader", "rcpputils")]
+
+
+@pytest.mark.skipif(
+    not all(part.is_dir() for part in (*_HEADERS, Path("/usr/include/nodelet"))),
+    reason="needs nodelets (Debian: libnodeletlib-dev, libnodeletlib-tools)",
+)
+def test_a_manager_loads_nodelets(network: Network, tmp_path: Path) -> None:
+    include = [f"-I{part}" for part in (*_HEADERS, Path("/usr/include/rcutils"))]
+    library = roscpp("relays", "std_msgs", "bondcpp", options=("-shared", "-fPIC", *include))
+    package, devel = tmp_path / "src" / "relays", tmp_path / "devel"
+    package.mkdir(parents=True)
+    (devel / "lib").mkdir(parents=True)
+    (devel / ".catkin").write_text(str(tmp_path / "src"))
+    shutil.copy(library, devel / "lib" / "librelays.so")
+    export = '<depend>nodelet</depend><export><nodelet plugin="${prefix}/nodelets.xml"/></export>'
+    (package / "package.xml").write_text(_MANIFEST.format("relays", export))
+    (package / "nodelets.xml").write_text(
+        '<library path="lib/librelays"><class name="relays/Capitals" type="relays::Capitals"'
+        ' base_class_type="nodelet::Nodelet"/></library>'
+    )
+    node = '<node pkg="nodelet" type="nodelet" output="screen"'
+    (package / "both.launch").write_text(
+        f'<launch>{node} name="manager" args="manager"/>'
+        f'{node} name="capitals" args="load relays/Capitals manager"/></launch>'
+    )
+    launch = network.run(
+        "-m",
+        "rosz",
+        "launch",
+        str(package / "both.launch"),
+        ROS_PACKAGE_PATH=f"{tmp_path / 'src'}:/usr/share",
+        CMAKE_PREFIX_PATH=f"{devel}:/usr",
+        PYTHONUNBUFFERED="1",
+    )
+    heard: SimpleQueue[Any] = SimpleQueue()
+    neighbour = network.node("neighbour")
+    neighbour.subscription("/capitals/out", String, heard.put)
+    neighbour.publisher("/capitals/in", String, latch=True).publish("from rosz")
+    try:
+        assert heard.get(timeout=4 * TIMEOUT).data == "FROM ROSZ"
+    except Empty:
+        pytest.fail(launch.output)
+    pids = [_pid(launch, name) for name in ("manager", "capitals")]
+    launch.send(signal.SIGINT)
+    assert launch.exit_code(2 * TIMEOUT) == 0
+    assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]
 
 
 @pytest.mark.skipif(not is_installed("roslib"), reason="needs roslib (Debian: python3-roslib)")

@@ -66,7 +66,11 @@ rospy.spin()
 
 @cache
 def roscpp(
-    name: str = "partner", *packages: str, folder: Path = _PROGRAMS, interfaces: Path | None = None
+    name: str = "partner",
+    *packages: str,
+    folder: Path = _PROGRAMS,
+    interfaces: Path | None = None,
+    options: tuple[str, ...] = (),
 ) -> str:
     """Return a compiled program, kept in pytest's cache from run to run.
 
@@ -77,6 +81,7 @@ def roscpp(
         packages: Packages of ROS 1 that it uses, beside roscpp.
         folder: Where its source is.
         interfaces: Package of its own messages and services, of a name equal to the program's.
+        options: Further options for the compiler.
     """
     if shutil.which("g++") is None or shutil.which("pkg-config") is None:
         pytest.skip("needs g++ and pkg-config (Debian: g++, pkg-config)")
@@ -104,7 +109,7 @@ def roscpp(
             for file in files:
                 generate = [PYTHON, str(_GENCPP), str(file), "-p", name, "-o", str(include / name)]
                 subprocess.run([*generate, "-e", str(_GENCPP_TEMPLATES)], check=True)
-            compiled = ["g++", "-O0", f"-I{include}", "-o", str(new), str(source)]
+            compiled = ["g++", "-O0", *options, f"-I{include}", "-o", str(new), str(source)]
             subprocess.run([*compiled, *flags.stdout.split()], check=True)
             new.rename(made)
     return str(made)
