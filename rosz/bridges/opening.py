@@ -80,11 +80,11 @@ class Access(msgspec.Struct, frozen=True):
         permit: Permissions of the clients by the rules of the machine; None without rules.
     """
 
-    host: str
-    password: str
-    shown: bool
-    tls: ssl.SSLContext | None
-    permit: Permit | None
+    host: str = "127.0.0.1"
+    password: str = ""
+    shown: bool = False
+    tls: ssl.SSLContext | None = None
+    permit: Permit | None = None
 
     def describe(self, protocol: str, port: int) -> list[str]:
         """Return the address of the server, and lines that say more.
@@ -143,15 +143,17 @@ def grant_access(
 class Entrance(msgspec.Struct, frozen=True):
     """The conditions under which clients of a bridge connect, and what they may do.
 
+    By default clients of this machine may do everything.
+
     Attributes:
         access: Who may connect, and how.
         gate: Permissions of the clients.
         admission: Conditions under which they may connect.
     """
 
-    access: Access
-    gate: Gate
-    admission: Admission
+    access: Access = Access()
+    gate: Gate = Gate()
+    admission: Admission = Admission()
 
     def describe(self, clients: str, port: int) -> list[str]:
         """Return lines that say where clients connect to.

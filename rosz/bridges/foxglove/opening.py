@@ -46,11 +46,8 @@ def open_bridge(node: Node, settings: Settings) -> tuple[FoxgloveBridge, list[st
     conditions = entrance(node, settings, HOLDER, _APPS)
     bridge = FoxgloveBridge(
         node,
-        settings.host,
         settings.port,
-        gate=conditions.gate,
-        admission=conditions.admission,
-        tls=conditions.access.tls,
+        entrance=conditions,
         limits=settings.limits,
         offer=settings.offer,
     )

@@ -5,22 +5,20 @@ from __future__ import annotations
 import asyncio
 import logging
 import re
-import ssl
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Self
 
 import msgspec
 
-from rosz.bridges.admission import Admission
 from rosz.bridges.assets import SHOWN, Assets
 from rosz.bridges.foxglove.catalog import Catalog
 from rosz.bridges.foxglove.connection import CAPABILITIES, Connection, Shared
 from rosz.bridges.foxglove.parameters import Parameters
 from rosz.bridges.foxglove.protocol import SUBPROTOCOLS
 from rosz.bridges.foxglove.services import Services
-from rosz.bridges.gate import Gate
 from rosz.bridges.listener import Listener, place
+from rosz.bridges.opening import Entrance
 from rosz.bridges.tasks import task_worker
 from rosz.bridges.websocket import Encodings, Outbox, Topics
 from rosz.errors import RoszError
@@ -74,11 +72,8 @@ class FoxgloveBridge:
 
     Args:
         node: The node. It is not closed with the bridge.
-        host: Address to listen at.
         port: Port to listen at; 0 for any.
-        gate: Permissions of the clients.
-        admission: Conditions under which a client may connect.
-        tls: Settings of TLS; without them, links are not encrypted.
+        entrance: Where clients connect, who may do so, and what they may do.
         limits: Limits on the number of clients and on their messages.
         offer: What the bridge offers.
 
@@ -93,16 +88,14 @@ class FoxgloveBridge:
     def __init__(
         self,
         node: Node,
-        host: str = "127.0.0.1",
         port: int = PORT,
         *,
-        gate: Gate = Gate(),  # noqa: B008  # frozen
-        admission: Admission = Admission(),  # noqa: B008  # frozen
-        tls: ssl.SSLContext | None = None,
+        entrance: Entrance = Entrance(),  # noqa: B008  # frozen
         limits: Limits = Limits(),  # noqa: B008  # frozen
         offer: Offer = Offer(),  # noqa: B008  # frozen
     ) -> None:
         self._log: logging.Logger = node.log
+        gate, admission, access = entrance.gate, entrance.admission, entrance.access
         self._admission = admission
         self._limits = limits
         self._lifecycle = keep = Lifecycle("the Foxglove bridge")
@@ -138,7 +131,7 @@ class FoxgloveBridge:
             )
         )
         try:
-            self._listener.open(host, port, tls)
+            self._listener.open(access.host, port, access.tls)
         except BaseException:
             self.close()
             raise

@@ -44,11 +44,8 @@ def open_bridge(node: Node, settings: Settings) -> tuple[WebsocketBridge, list[s
     conditions = entrance(node, settings, HOLDER)
     bridge = WebsocketBridge(
         node,
-        settings.host,
         settings.port,
-        gate=conditions.gate,
-        admission=conditions.admission,
-        tls=conditions.access.tls,
+        entrance=conditions,
         spelling=settings.spelling,
         limits=Limits(fragment_size=settings.fragment_size),
     )

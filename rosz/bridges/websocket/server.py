@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import ssl
 import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
-from rosz.bridges.admission import Admission
-from rosz.bridges.gate import Gate
 from rosz.bridges.listener import Listener, pieces, place
+from rosz.bridges.opening import Entrance
 from rosz.bridges.tasks import task_worker
 from rosz.bridges.websocket.actions import Gateways
 from rosz.bridges.websocket.connection import Connection, Shared
@@ -70,11 +68,8 @@ class WebsocketBridge:
 
     Args:
         node: The node. It is not closed with the bridge.
-        host: Address to listen at.
         port: Port to listen at; 0 for any.
-        gate: Permissions of the clients.
-        admission: Conditions under which a client may connect.
-        tls: Settings of TLS; without them, links are not encrypted.
+        entrance: Where clients connect, who may do so, and what they may do.
         spelling: Whose names of types and fields a client gets that has not shown its own.
         limits: Limits on the number of clients and on their messages.
 
@@ -89,16 +84,14 @@ class WebsocketBridge:
     def __init__(
         self,
         node: Node,
-        host: str = "127.0.0.1",
         port: int = PORT,
         *,
-        gate: Gate = Gate(),  # noqa: B008  # frozen
-        admission: Admission = Admission(),  # noqa: B008  # frozen
-        tls: ssl.SSLContext | None = None,
+        entrance: Entrance = Entrance(),  # noqa: B008  # frozen
         spelling: Spelling = "ros1",
         limits: Limits = Limits(),  # noqa: B008  # frozen
     ) -> None:
         self._log: logging.Logger = node.log
+        gate, admission, access = entrance.gate, entrance.admission, entrance.access
         self._admission = admission
         self._limits = limits
         self._lifecycle = Lifecycle("the websocket bridge")
@@ -121,7 +114,7 @@ class WebsocketBridge:
             )
         )
         try:
-            self._listener.open(host, port, tls)
+            self._listener.open(access.host, port, access.tls)
         except BaseException:
             self.close()
             raise

@@ -18,6 +18,7 @@ from websockets.sync.client import connect
 from rosz.bridges.admission import Admission
 from rosz.bridges.foxglove import Limits, Offer
 from rosz.bridges.gate import Gate
+from rosz.bridges.opening import Entrance
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import Header, String
@@ -297,7 +298,11 @@ def test_simulated_time(network: Network) -> None:
 
 
 def test_assets(network: Network) -> None:
-    with bridge_on(network, package_in(network.folder)) as bridge, bridge.client() as client:
+    """Links are followed that the package has itself, as an installation with links has them."""
+    packages = package_in(network.folder)
+    (packages / "arm" / "linked.stl").symlink_to(packages / "other.stl")
+    (packages / "arm" / "folder").symlink_to(packages)
+    with bridge_on(network, packages) as bridge, bridge.client() as client:
 
         def fetch(uri: str) -> bytes | str:
             client.send("fetchAsset", uri=uri, requestId=9)
@@ -307,6 +312,7 @@ def test_assets(network: Network) -> None:
             return frame[10 + length :] if status == 0 else frame[10 : 10 + length].decode()
 
         assert fetch("package://arm/meshes/base%20link.stl") == b"solid"
+        assert fetch("package://arm/linked.stl") == b"secret"
         for uri, reason in (
             ("package://arm/secret.txt", "the patterns of this bridge leave it out"),
             ("file:///etc/passwd", "leave it out"),
@@ -314,6 +320,7 @@ def test_assets(network: Network) -> None:
             ("package://arm/%2e%2e/other.stl", "leads out of package 'arm'"),
             ("package://arm/meshes/%2e%2e/%2e%2e/other.stl", "leads out of package 'arm'"),
             ("package://%2e%2e/other.stl", "'..'"),
+            ("package://arm/folder/%2e%2e/%2e%2e/other.stl", "leads out of package 'arm'"),
             ("package://arm/none.stl", "has no file 'none.stl'"),
             ("package://arm/meshes%00.stl", "has no file"),
             (f"package://arm/{'x' * 1000}.stl", "cannot read"),
@@ -419,7 +426,7 @@ def test_too_much_at_once(network: Network) -> None:
     ],
 )
 def test_passwords(network: Network, options: Any, path: str, status: int | None) -> None:
-    with bridge_on(network, admission=Admission("secret")) as bridge:
+    with bridge_on(network, entrance=Entrance(admission=Admission("secret"))) as bridge:
         if status is None:
             with bridge.client(path, **options) as client:
                 client.sync()
@@ -442,7 +449,10 @@ def test_other_pages_and_protocols(bridge: Bridge) -> None:
 
 def test_a_read_only_bridge(network: Network) -> None:
     network.node("other").publisher("name", String, latch=True).publish("x")
-    with bridge_on(network, gate=Gate(read_only=True)) as bridge, bridge.client() as client:
+    with (
+        bridge_on(network, entrance=Entrance(gate=Gate(read_only=True))) as bridge,
+        bridge.client() as client,
+    ):
         capabilities = client.wait_op("serverInfo")["capabilities"]
         assert capabilities == ["parameters", "parametersSubscribe", "connectionGraph", "assets"]
         client.subscribe("/name")
@@ -473,7 +483,7 @@ def test_rules_and_patterns(network: Network) -> None:
             published=(re.compile("/cmd"),),
         ),
     ):
-        with bridge_on(network, gate=gate) as bridge, bridge.client() as client:
+        with bridge_on(network, entrance=Entrance(gate=gate)) as bridge, bridge.client() as client:
             client.channel("/odom")
             client.service("/odom/flip")
             assert set(client.channels) == {"/odom"}

@@ -70,7 +70,7 @@ class Client:
 def bridge_on(network: Network, **options: Any) -> Iterator[Bridge]:
     """Open a bridge at any port."""
     node = network.node("bridge")
-    with WebsocketBridge(node, port=0, **options) as server:
+    with WebsocketBridge(node, 0, **options) as server:
         yield Bridge(network, node, server)
 
 

@@ -16,6 +16,7 @@ from network import TIMEOUT, Network, eventually
 from websockets.exceptions import ConnectionClosed
 
 from rosz.bridges.admission import Admission
+from rosz.bridges.opening import Entrance
 from rosz.bridges.websocket import Limits
 from rosz.bridges.websocket.operations import Fragment, Fragments
 from rosz.bridges.websocket.outbox import Encodings, Feed, Message, Outbox
@@ -105,7 +106,7 @@ def test_an_enormous_frame(bridge: Bridge) -> None:
 )
 def test_clients_without_the_password(network: Network, text: Any, reason: str) -> None:
     limits = Limits(password_seconds=0.1 if text is None else TIMEOUT)
-    options: Any = {"admission": Admission("secret"), "limits": limits}
+    options: Any = {"entrance": Entrance(admission=Admission("secret")), "limits": limits}
     with bridge_on(network, **options) as bridge, bridge.client("?token=secret") as trusted:
         with bridge.client() as client:
             if text is not None:

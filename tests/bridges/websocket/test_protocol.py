@@ -22,6 +22,7 @@ from websockets.sync.client import connect
 
 from rosz.bridges.admission import Admission
 from rosz.bridges.gate import Gate
+from rosz.bridges.opening import Entrance
 from rosz.bridges.websocket import Limits
 from rosz.errors import ActionError
 from rosz.msgs.example_interfaces.action import Fibonacci
@@ -445,7 +446,7 @@ def test_too_much_at_once(network: Network) -> None:
     ],
 )
 def test_passwords(network: Network, options: Any, path: str, status: int | None) -> None:
-    with bridge_on(network, admission=Admission("secret")) as bridge:
+    with bridge_on(network, entrance=Entrance(admission=Admission("secret"))) as bridge:
         if status is None:
             with bridge.client(path, **options) as client:
                 client.sync()
@@ -465,7 +466,7 @@ def test_pages_of_this_machine(bridge: Bridge) -> None:
 
 
 def test_rosauth(network: Network) -> None:
-    with bridge_on(network, admission=Admission("secret")) as bridge:
+    with bridge_on(network, entrance=Entrance(admission=Admission("secret"))) as bridge:
         now = int(time.time())
         fields = {"client": "c", "dest": "d", "rand": "r", "t": now, "level": "l", "end": now + 600}
         mac = hashlib.sha512("".join(map(str, ("secret", *fields.values()))).encode()).hexdigest()
@@ -517,7 +518,10 @@ def test_gates(gate: Gate, allowed: list[Any], refused: list[Any]) -> None:
 
 
 def test_a_read_only_bridge(network: Network) -> None:
-    with bridge_on(network, gate=Gate(read_only=True)) as bridge, bridge.client() as client:
+    with (
+        bridge_on(network, entrance=Entrance(gate=Gate(read_only=True))) as bridge,
+        bridge.client() as client,
+    ):
         network.node("other").publisher("name", String, latch=True).publish("x")
         client.send("subscribe", topic="/name", type="std_msgs/String")
         assert client.receive()["msg"] == {"data": "x"}
