@@ -19,7 +19,7 @@ from typing import Literal
 import msgspec
 
 from rosz.errors import UsageError
-from rosz.packages import PackageIndex, manifest_of
+from rosz.packages import SYSTEM, PackageIndex, manifest_of
 
 __all__ = ("DEFAULT_RENDEZVOUS", "Environment", "package_index")
 
@@ -29,6 +29,8 @@ DEFAULT_RENDEZVOUS = "tcp/localhost:7447"
 _MAX_DOMAIN = 232
 _CATKIN_MARKER = ".catkin"
 _PRIVATE = "private"
+_WINDOWS = Path(__file__).parent / "web" / "windows"
+"""Where the packages are that show pages in place of ROS 1's windows."""
 _USER_FOLDERS = Path("/run/user")
 """Where systemd makes a folder for each user who is logged in."""
 
@@ -127,13 +129,20 @@ def package_index(environment: Environment) -> PackageIndex:
 
     Installed distributions register folders of packages under the entry point group
     ``rosz.packages``: each entry names a module, and its folder is searched.
+
+    Where there is a screen, Debian's rviz and rqt go before the pages that take their place.
     """
     # Reading what is installed takes longer than most commands, and few need it.
     return PackageIndex(
         lambda: [*environment.package_roots, *_registered_roots(), *_shipped_roots()],
         prefixes=environment.prefixes,
-        system=True,
+        later=(SYSTEM, _WINDOWS) if _has_screen(os.environ) else (_WINDOWS, SYSTEM),
     )
+
+
+def _has_screen(env: Mapping[str, str]) -> bool:
+    """Return whether programs can open windows."""
+    return any(env.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def _shipped_roots() -> list[Path]:

@@ -28,6 +28,7 @@ from rosz.errors import ExecutableNotFound, NotFoundError, PackageError, Package
 __all__ = (
     "MANIFEST",
     "ROSBUILD_MANIFEST",
+    "SYSTEM",
     "Package",
     "PackageIndex",
     "crawl",
@@ -44,7 +45,7 @@ _NO_CODE = frozenset({"__pycache__", "node_modules"})
 _SOURCES = "src"
 _SPACES = ("devel", "devel_isolated", "install", "install_isolated")
 """Folders beside a workspace's sources that builds write to."""
-_SYSTEM = Path("/usr/share")
+SYSTEM = Path("/usr/share")
 """Where Debian has its packages, side by side with those that are none of ROS."""
 _SHEBANG_BYTES = 256
 _COMMENT = re.compile(r"#.*")
@@ -226,7 +227,8 @@ class PackageIndex:
         roots: Folders that are packages or hold some at any depth, earlier ones first; or a
             function that returns them when they are needed.
         prefixes: Devel and install spaces that may have programs of the packages.
-        system: Whether packages of Debian are found by their names.
+        later: Folders whose packages are found by the names of their own folders, if no other one
+            has the name, as those of Debian.
     """
 
     def __init__(
@@ -234,11 +236,11 @@ class PackageIndex:
         roots: Sequence[Path] | Callable[[], Sequence[Path]],
         *,
         prefixes: Sequence[Path] = (),
-        system: bool = False,
+        later: Sequence[Path] = (),
     ) -> None:
         self._given = roots
         self._prefixes = tuple(prefixes)
-        self._system = system
+        self._later = tuple(later)
 
     @cached_property
     def roots(self) -> tuple[Path, ...]:
@@ -287,9 +289,10 @@ class PackageIndex:
         for error in self.broken:
             if Path(error.path).parent.name == name:
                 raise error
-        installed = self._in(_SYSTEM, name) if self._system else None
-        if installed is not None:
-            return installed
+        for root in self._later:
+            installed = self._in(root, name)
+            if installed is not None:
+                return installed
         raise PackageNotFound(name, self._known, [str(root) for root in self.roots])
 
     def _in(self, root: Path, name: str) -> Package | None:
@@ -302,11 +305,11 @@ class PackageIndex:
         return None
 
     def names(self) -> list[str]:
-        """Return the names of all packages but those of Debian, sorted."""
+        """Return the names of all packages but the later ones, sorted."""
         return sorted(self._known)
 
     def packages(self) -> list[Package]:
-        """Return all packages but those of Debian, sorted by name."""
+        """Return all packages but the later ones, sorted by name."""
         return [self._known[name] for name in self.names()]
 
 
@@ -351,7 +354,7 @@ def crawl(root: Path) -> Iterator[Path]:
             names.clear()
             if not _IGNORE_MARKERS & set(files):
                 yield Path(folder)
-        elif _IGNORE_MARKERS & set(files) or Path(folder).parent == _SYSTEM:
+        elif _IGNORE_MARKERS & set(files) or Path(folder).parent == SYSTEM:
             names.clear()
         names[:] = sorted(n for n in names if not n.startswith(".") and n not in _NO_CODE)
 

@@ -19,15 +19,13 @@ def _of_ros2(what: str) -> str:
     )
 
 
-_GRAPHS = "'rosz web' shows it at /graph, and 'rosz graph -o graph.svg' draws it"
+_WINDOWS = "'rosz web' shows graph, plots, log, parameters and more in a browser"
 _PICTURES = "'rosz web' shows images at /images"
-_BAGS = "use 'rosz bag info', 'rosz bag play' and 'rosz bag export'; Foxglove shows MCAP files"
 _GAZEBO = "'rosz launch turtlebot3_sim turtlebot3_sim.launch' simulates a TurtleBot3; " + _of_ros2(
     "ros_gz_bridge"
 )
 _TRANSFORMS = "in a node use tf2_ros: Buffer, TransformListener, StaticTransformBroadcaster"
 _LAUNCH = "launch files are XML: 'rosz launch PACKAGE FILE' runs them"
-_PLOT = "'rosz web' plots at /plot, and 'rosz topic echo -p TOPIC' prints CSV to plot"
 
 COMMANDS = {
     "catkin": _NOTHING_TO_BUILD,
@@ -45,17 +43,6 @@ COMMANDS = {
     "rosmaster": _MASTER,
     "rostest": "start the nodes with 'rosz launch' and run the test, which may import rostest",
     "rosversion": "'rosz --version' prints the version of rosz",
-    "rqt": "'rosz web' shows graph, plots, log, parameters and more in a browser",
-    "rqt_bag": _BAGS,
-    "rqt_console": "'rosz web' shows it at /console, and 'rosz log' prints it",
-    "rqt_graph": _GRAPHS,
-    "rqt_image_view": _PICTURES,
-    "rqt_logger_level": "use 'rosz log level NODE LOGGER LEVEL', or /console of 'rosz web'",
-    "rqt_plot": _PLOT,
-    "rqt_publisher": "use 'rosz topic pub', or /topics of 'rosz web'",
-    "rqt_tf_tree": "'rosz tf tree' prints it, 'rosrun tf view_frames' draws it",
-    "rqt_topic": "use 'rosz topic list -v', 'rosz topic echo' and 'rosz topic hz', or 'rosz web'",
-    "rviz": _of_ros2("rviz2"),
     "wstool": "git gets sources; a package below 'src' of the workspace is found as it is",
 }
 """Commands that people type; each has a program of this name in ``rosz/cli/absent``."""
@@ -106,7 +93,7 @@ def instead_of(name: str) -> str:
     for table in COMMANDS, _ALIASES, _PACKAGES, _MODULES:
         if name in table:
             return table[name]
-    for prefix, other in (("rqt_", "rqt"), ("gazebo_", "gazebo")):
+    for prefix, text in (("rqt_", _WINDOWS), ("gazebo_", _GAZEBO)):
         if name.startswith(prefix):
-            return COMMANDS[other]
+            return text
     return ""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rosz.bridges.admission import is_loopback
 from rosz.bridges.opening import ServerSettings, grant_access
 from rosz.errors import UsageError
+from rosz.msgs.std_srvs.srv import Trigger
 from rosz.web.guard import Guard
 from rosz.web.model import Permission
 
@@ -16,9 +17,11 @@ if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.web.server import PageServer
 
-__all__ = ("PORT", "Settings", "open_page")
+__all__ = ("PAGE_SERVICE", "PORT", "Settings", "open_page")
 
 PORT = 8080
+PAGE_SERVICE = "page"
+"""Private name of the service that tells other programs of this machine the address."""
 HOLDER = "web"
 """Name of those who use the page in the rules of a machine."""
 _LIBRARY = "the page needs a library: pip install 'rosz[web]'"
@@ -64,4 +67,11 @@ def open_page(node: Node, settings: Settings) -> tuple[PageServer, list[str]]:
         ),
         tls=access.tls,
     )
-    return server, access.describe("http", server.port)
+    described = access.describe("http", server.port)
+    address = described[0].partition("?")[0]  # without the password
+    node.service(
+        f"~{PAGE_SERVICE}",
+        Trigger,
+        lambda _request: Trigger.Response(success=True, message=address),
+    )
+    return server, described

@@ -306,9 +306,3 @@ def test_a_stopped_node_does_not_block(shell: Shell, network: Network) -> None:
         assert time.monotonic() - began < 15
     finally:
         program.send(signal.SIGCONT)
-
-
-def test_rqt_reconfigure_names_its_replacement(shell: Shell) -> None:
-    program = shell.start("run", "rqt_reconfigure", "rqt_reconfigure")
-    assert program.exit_code() == 1
-    assert "use 'rosz reconfigure list', 'describe NODE'" in program.output

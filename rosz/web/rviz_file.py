@@ -1,0 +1,121 @@
+"""The files that rviz is started with (``-d``), as setups of the view in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rosz.errors import UsageError
+from rosz.web.scene import GRID, ROBOT, TF, Look, Setup
+
+__all__ = ("read_rviz",)
+
+_TOPIC = "Topic"
+_TOPICS = {
+    "LaserScan": _TOPIC,
+    "Map": _TOPIC,
+    "Marker": "Marker Topic",
+    "MarkerArray": "Marker Topic",
+    "Odometry": _TOPIC,
+    "Path": _TOPIC,
+    "PointCloud": _TOPIC,
+    "PointCloud2": _TOPIC,
+    "PointStamped": _TOPIC,
+    "Polygon": _TOPIC,
+    "Pose": _TOPIC,
+    "PoseArray": _TOPIC,
+    "PoseWithCovariance": _TOPIC,
+    "Range": _TOPIC,
+}
+_COLORS = {"AxisColor": "height", "Intensity": "intensity", "RGB8": "rgb"}
+_CLOUDS = ("LaserScan", "PointCloud", "PointCloud2")
+
+
+def read_rviz(path: Path) -> tuple[Setup, list[str]]:
+    """Return the setup that a file of rviz describes, and the displays that are not shown.
+
+    Args:
+        path: The file.
+
+    Raises:
+        UsageError: It cannot be read, or is not one of rviz.
+    """
+    try:
+        content = yaml.safe_load(path.read_text())
+        manager = content["Visualization Manager"]
+        listed = list(_displays(manager.get("Displays") or []))
+        options = manager.get("Global Options") or {}
+        view = str(((manager.get("Views") or {}).get("Current") or {}).get("Class", ""))
+    except (OSError, ValueError) as error:
+        raise UsageError(f"cannot read '{path}': {error}") from error
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
+        raise UsageError(
+            f"'{path}' is not a file of rviz: expected YAML with a 'Visualization Manager'"
+        ) from error
+    looks: list[Look] = []
+    left_out: list[str] = []
+    for one in listed:
+        look = _look(one)
+        if look is None:
+            left_out.append(f"{one.get('Name', 'a display')} ({one.get('Class', 'no class')})")
+        elif all(look.name != known.name for known in looks):
+            looks.append(look)
+    frame = str(options.get("Fixed Frame", "")).removeprefix("/")
+    above = "top" if view.endswith("TopDownOrtho") else "orbit"
+    return Setup("" if frame.startswith("<") else frame, tuple(looks), above), left_out
+
+
+def _displays(listed: list[Any]) -> Iterator[dict[str, Any]]:
+    for one in listed:
+        if isinstance(one, dict):
+            if str(one.get("Class", "")).endswith("/Group"):
+                yield from _displays(one.get("Displays") or [])
+            else:
+                yield one
+
+
+def _look(display: dict[str, Any]) -> Look | None:
+    """Return the display of the view for one of rviz; None if there is none."""
+    kind = str(display.get("Class", "")).rpartition("/")[2]
+    visible = bool(display.get("Enabled", True))
+    if kind == "Grid":
+        return Look(GRID, size=_number(display.get("Cell Size"), 1.0), visible=visible)
+    if kind == "TF":
+        return Look(TF, size=0.3 * _number(display.get("Marker Scale"), 0.0), visible=visible)
+    if kind == "RobotModel":
+        name = str(display.get("Robot Description") or "robot_description").removeprefix("/")
+        return Look(ROBOT if name == "robot_description" else f"{ROBOT}:/{name}", visible=visible)
+    field = _TOPICS.get(kind)
+    if field is None:
+        return None
+    topic = display.get(field, display.get(_TOPIC, ""))
+    if isinstance(topic, dict):  # a file of rviz2
+        topic = topic.get("Value", "")
+    if not topic:
+        return None
+    color, size = _color(display.get("Color")), 0.0
+    if kind in _CLOUDS:
+        color = _COLORS.get(str(display.get("Color Transformer", "")), color)
+        size = _number(display.get("Size (Pixels)"), 0.0)
+    elif kind == "Map":
+        color = "costmap" if display.get("Color Scheme") == "costmap" else ""
+    elif kind.startswith("Marker"):
+        color = ""
+    return Look(f"/{str(topic).removeprefix('/')}", color, size, visible)
+
+
+def _number(value: Any, default: float) -> float:
+    return float(value) if isinstance(value, int | float) else default
+
+
+def _color(value: Any) -> str:
+    """Return ``255; 0; 0`` as ``#ff0000``; empty if it is not a color."""
+    parts = str(value or "").split(";")
+    try:
+        numbers = [int(part) for part in parts]
+        return f"#{bytes(numbers).hex()}" if len(numbers) == 3 else ""  # noqa: PLR2004
+    except ValueError:
+        return ""

@@ -1,0 +1,153 @@
+"""ROS 1's windows as pages: rqt_graph, rqt_plot, rviz and others."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from network import TIMEOUT, Network
+
+import rosz.environment
+from rosz.environment import Environment, package_index
+from rosz.errors import UsageError
+from rosz.web.rviz_file import read_rviz
+from rosz.web.scene import Look, Setup
+from rosz.web.window import WINDOWS, page_of
+
+LONG = 4 * TIMEOUT
+RVIZ = """
+Panels:
+  - Class: rviz/Displays
+Visualization Manager:
+  Class: ""
+  Displays:
+    - {Class: rviz/Grid, Name: Grid, Enabled: true, Cell Size: 0.5, Color: 160; 160; 164}
+    - {Class: rviz/RobotModel, Name: Robot, Enabled: true, Robot Description: robot_description}
+    - {Class: rviz/TF, Name: TF, Enabled: false, Marker Scale: 1}
+    - Class: rviz/Group
+      Name: Sensors
+      Displays:
+        - {Class: rviz/LaserScan, Name: Scan, Topic: /scan, Color: 255; 0; 0, Size (Pixels): 5,
+           Color Transformer: FlatColor, Enabled: true}
+        - {Class: rviz/PointCloud2, Name: Cloud, Topic: cloud, Color Transformer: AxisColor}
+        - {Class: rviz/Camera, Name: Camera, Image Topic: /image}
+    - {Class: rviz/MarkerArray, Name: Markers, Marker Topic: /markers}
+    - {Class: rviz/Map, Name: Costs, Topic: /costmap, Color Scheme: costmap}
+    - {Class: rviz_default_plugins/Path, Name: Path, Topic: {Value: /plan}, Color: 25; 255; 0}
+  Global Options:
+    Fixed Frame: odom
+  Views:
+    Current: {Class: rviz/TopDownOrtho}
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "page"),
+    [
+        ("rqt_graph", "/graph"),
+        ("rqt_plot", "/plot"),
+        ("rqt_plot /turtle1/pose/x:y /turtle2/pose/x", "/plot?fields=/turtle1/pose/x:y,"),
+        ("rqt_plot turtle1/pose/x", "/plot?fields=/turtle1/pose/x"),
+        ("rqt_plot -e --clear-config /a/data[0]", "/plot?fields=/a/data[0]"),
+        ("rqt_image_view /camera/image_raw", "/images?topics=/camera/image_raw"),
+        ("rqt_reconfigure", "/reconfigure"),
+        ("rqt_gui -s rqt_graph", "/graph"),
+        ("rqt_gui --standalone=rqt_plot/Plot --args /a/b", "/plot?fields=/a/b"),
+        ("rqt --perspective-file my.perspective", "/"),
+        ("rqt_tf_tree", "/3d?show=grid,tf"),
+        ("rviz", "/3d"),
+        ("rviz -f base_link", "/3d?frame=base_link"),
+    ],
+)
+def test_what_is_written_leads_to_the_page(line: str, page: str) -> None:
+    name, *words = line.split()
+    found, notes = page_of(name, words)
+    assert found.startswith(page)
+    assert notes == []
+
+
+def test_a_file_of_rviz_is_a_setup(tmp_path: Path) -> None:
+    file = tmp_path / "robot.rviz"
+    file.write_text(RVIZ)
+    setup, left_out = read_rviz(file)
+    assert setup == Setup(
+        "odom",
+        (
+            Look("grid", size=0.5),
+            Look("robot"),
+            Look("tf", size=0.3, visible=False),
+            Look("/scan", "#ff0000", 5),
+            Look("/cloud", "height"),
+            Look("/markers"),
+            Look("/costmap", "costmap"),
+            Look("/plan", "#19ff00"),
+        ),
+        "top",
+    )
+    assert left_out == ["Camera (rviz/Camera)"]
+    page, notes = page_of("rviz", ["-d", str(file), "-f", "map"])
+    assert page.startswith("/3d?frame=map&show=grid;size=0.5,robot,")
+    assert notes == ["not shown: Camera (rviz/Camera)"]
+
+
+@pytest.mark.parametrize("text", ["[General]\nx=1", "a: [", "Panels: []", "- 1", "\x00"])
+def test_a_file_that_is_none_of_rviz_is_named(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "robot.vcg"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=re.escape(str(file))):
+        page_of("rviz", ["-d", str(file)])
+    with pytest.raises(UsageError, match="No such file"):
+        page_of("rviz", ["-d", str(tmp_path / "none.rviz")])
+
+
+def test_every_window_is_a_program_of_a_package() -> None:
+    share = Path(__file__).parents[2] / "rosz" / "web" / "windows"
+    for name in set(WINDOWS) - {"rqt"}:
+        program = share / name / name
+        assert os.access(program, os.X_OK)
+        assert f'main("{name}")' in program.read_text()
+        assert f"<name>{name}</name>" in (share / name / "package.xml").read_text()
+
+
+@pytest.mark.system
+@pytest.mark.timeout(240)
+def test_windows_open_where_a_page_is_served(network: Network) -> None:
+    alone = network.run(
+        "-m", "rosz", "run", "rqt_graph", "rqt_graph", DISPLAY="", WAYLAND_DISPLAY=""
+    )
+    found = re.search(r"the page is at (http://\S+:\d+)/graph", alone.wait_for("/graph", LONG))
+    assert found is not None
+    alone.wait_for("press Ctrl-C", LONG)
+    second = network.run(
+        "-m", "rosz", "run", "rqt_plot", "rqt_plot", "/a/data", DISPLAY="", WAYLAND_DISPLAY=""
+    )
+    assert second.exit_code(LONG) == 0
+    assert second.output == f"the page is at {found[1]}/plot?fields=/a/data"
+    file = network.folder / "my.launch"
+    (network.folder / "my.rviz").write_text(RVIZ)
+    file.write_text(
+        '<launch><node pkg="rviz" type="rviz" name="rviz" required="true" output="screen"'
+        ' args="-d $(dirname)/my.rviz"/></launch>'
+    )
+    launch = network.run("-m", "rosz", "launch", str(file), DISPLAY="", WAYLAND_DISPLAY="")
+    launch.wait_for(f"{found[1]}/3d?frame=odom&show=grid", LONG)
+    launch.wait_for("not shown: Camera (rviz/Camera)", LONG)
+    launch.wait_for("press Ctrl-C", LONG)
+
+
+def test_an_installed_rviz_goes_first_where_there_is_a_screen(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "rviz").mkdir()
+    (tmp_path / "rviz" / "package.xml").write_text("<package><name>rviz</name></package>")
+    monkeypatch.setattr(rosz.environment, "SYSTEM", tmp_path)
+    environment = Environment.read({"HOME": str(tmp_path)})
+    for display, folder in (("", "windows"), (":0", tmp_path.name)):
+        monkeypatch.setenv("DISPLAY", display)
+        monkeypatch.setenv("WAYLAND_DISPLAY", "")
+        packages = package_index(environment)
+        assert packages.find("rviz").path.parent.name == folder
+        assert packages.find("rqt_graph").path.parent.name == "windows"
+        assert "rviz" not in packages.names()
