@@ -33,7 +33,7 @@ from rosz.msgs.unique_identifier_msgs.msg import UUID
 from rosz.node import action_server
 from rosz.node.action_client import ActionClient, ClientGoal
 from rosz.node.action_server import ActionServer, ServerGoal
-from rosz.node.goals import GoalState
+from rosz.node.goals import RESULT, GoalState
 from rosz.qos import LATCHED
 
 Goal, Result, Feedback = Fibonacci.Goal, Fibonacci.Result, Fibonacci.Feedback
@@ -383,6 +383,27 @@ def test_a_server_that_does_not_answer(world: World) -> None:
     program.kill()
     with pytest.raises(ActionError, match="is lost"):
         handle.wait(TIMEOUT, silence=2.0)
+
+
+def test_a_result_is_asked_for_again_when_the_server_answers(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Zenoh ends the query as it gives a link up, and never ends one that comes at that moment."""
+    world.server(lambda goal: goal.succeed(Result([goal.request.order])))
+    client = world.client()
+    watch, results = client._watch, client._clients[RESULT]
+    ask, silences = results.call, []
+
+    def call(request: Any, timeout: float) -> Any:
+        silences.append(watch.silence)
+        if len(silences) > 1:
+            return ask(request, timeout)
+        watch._heard, watch._silent = time.monotonic() - 2.0, True
+        raise ServiceError("the link is given up")
+
+    monkeypatch.setattr(results, "call", call)
+    assert client.send(Goal(7)).result(TIMEOUT).sequence[0] == 7
+    assert silences == [0.0, 0.0]
 
 
 def test_nobody_serves_the_action(world: World) -> None:
