@@ -322,8 +322,8 @@ def main() -> None:
             rows.append((f"{count} on {machines}", found.complete))
     for count in (1000, 10_000):
         found = simulate(deaf, count, 100)
-        print(_row(count, 100, found, "if none heard of others' parameters"))
-        rows.append((f"{count} on 100, none heard of", found.complete))
+        print(_row(count, 100, found, "if a node cost the others nothing"))
+        rows.append((f"{count} on 100, if nothing", found.complete))
     print("", *bars(rows, "s"), sep="\n")
     print("\nHearing of others takes as much as all else of a start")
     for machines in (1, 100):

@@ -10,6 +10,8 @@ from .simulate import HOSTS, Costs, again, knee, load, measured, simulate
 
 CROWDS = [one for one in load() if one.mode in HOSTS]
 COSTS = Costs.fit(CROWDS)
+TICKS = 0.02
+"""Seconds of a core that are not seen: Linux counts in ticks, in user and in system mode."""
 ALONE = Costs(
     start=0.1, hears=0.0, serves=0.01, routes=0.0, relays=0.002, own=10.0, other=0.5, across=3.0
 )
@@ -20,7 +22,7 @@ def test_crowds_come_out_as_they_were_measured(sight: Sight) -> None:
     found, real = again(COSTS, sight), measured(sight)
     assert found.complete == pytest.approx(real.complete, rel=0.25)
     assert found.busy == pytest.approx(real.busy, rel=0.2)
-    assert found.core == pytest.approx(real.core, rel=0.35)
+    assert found.core == pytest.approx(real.core, rel=0.35, abs=TICKS)
     assert found.traffic == pytest.approx(real.traffic, rel=0.35)
 
 
