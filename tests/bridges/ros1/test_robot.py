@@ -7,6 +7,7 @@ import re
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from network import TIMEOUT, Program, eventually, repeats
@@ -61,6 +62,9 @@ SERVER = """
     rospy.spin()
 """
 ENDLESS = "1000000"
+_DYNPARAM = Path("/usr/lib/dynamic_reconfigure/dynparam")
+"""ROS 1's own command (Debian: python3-dynamic-reconfigure)."""
+
 STATES = ("SUCCEEDED", "ABORTED", "PREEMPTED")
 
 Start = Callable[..., Program]
@@ -225,7 +229,7 @@ def test_goals_of_ros2_clients_for_a_roscpp_server(robot: Start, node: Node) -> 
     assert sum(line.startswith("goal") for line in server.lines) == 5  # each once
 
 
-def test_settings_of_a_roscpp_node(robot: Start, node: Node) -> None:
+def test_settings_of_a_roscpp_node(world: World, robot: Start, node: Node) -> None:
     program = robot("configured", "__name:=configured")
     with Client(node, "configured") as client:
         client.wait(TIMEOUT)
@@ -233,6 +237,9 @@ def test_settings_of_a_roscpp_node(robot: Start, node: Node) -> None:
         program.wait_for("int 3 ")
         assert client.update({"int_": 7}, TIMEOUT)["str_"] == "corrected"
     assert node.params["/configured/int_"] == 7
+    if _DYNPARAM.exists():
+        assert world.run(str(_DYNPARAM), "list").strip() == "/configured"
+        assert "'int_': 7" in world.run(str(_DYNPARAM), "get", "/configured")
 
 
 def _transform(node: Node, parent: str, child: str) -> TransformStamped:
