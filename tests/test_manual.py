@@ -36,6 +36,16 @@ def test_pages_begin_with_a_title_and_refer_to_topics_that_exist(page: Path) -> 
     assert topics <= {other.stem for other in PAGES}
 
 
+def test_pictures_are_there_and_small() -> None:
+    folder = ROOT / "rosz" / "share" / "manual"
+    named = {
+        found for page in PAGES for found in re.findall(r"!\[.*?\]\((.+?)\)", page.read_text())
+    }
+    there = {str(file.relative_to(folder)) for file in folder.rglob("*.webp")}
+    assert named == there
+    assert sum((folder / name).stat().st_size for name in there) < 400_000
+
+
 @pytest.mark.parametrize("page", [README, *PAGES], ids=lambda page: page.stem)
 def test_python_in_pages_is_valid(page: Path) -> None:
     for block in blocks(page):

@@ -152,7 +152,7 @@ class _Console:
             .classes("rosz-card w-full")
             .props('flat dense virtual-scroll :rows-per-page-options="[0]"')
         )
-        table.style("max-height: calc(100vh - 160px)")
+        table.style("max-height: calc(100vh - 220px)")
         table.add_slot("body-cell-level", _LEVEL_CELL)
         table.add_slot("body-cell-text", _TEXT_CELL)
         return table

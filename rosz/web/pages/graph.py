@@ -139,7 +139,7 @@ class _Graph:
             with (
                 ui.element("div")
                 .classes("rosz-card w-full overflow-auto p-2")
-                .style("max-height: calc(100vh - 150px); min-height: 200px") as self._card
+                .style("max-height: calc(100vh - 170px); min-height: 200px") as self._card
             ):
                 self._drawing = ui.html("", sanitize=False).classes("rosz-graph")
                 for kind in ("click", "keydown"):

@@ -72,6 +72,7 @@ _STYLE = """
 :root { --rosz-line: #d9dee7; --rosz-soft: #5b6577; --rosz-card: #ffffff; --rosz-scene: #e9edf4; }
 body { background: #f4f6fa; }
 .nicegui-content { padding: 0; }
+body.body--dark { color-scheme: dark; }
 body.body--dark { background: #12151c; --rosz-line: #2c3340; --rosz-soft: #9aa5b8;
   --rosz-card: #1a1f29; --rosz-scene: #1b202a; }
 .rosz-card { background: var(--rosz-card); border: 1px solid var(--rosz-line);
