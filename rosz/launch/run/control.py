@@ -27,7 +27,7 @@ __all__ = ("LaunchStatus", "NodeStatus", "StatusClient", "StatusRequest", "Statu
 _STATUS_TIMEOUT = 2.0
 _ACTION_TIMEOUT = 60.0
 _MEASURE_TIMEOUT = 1.0
-_OUTPUT_TIMEOUT = 5.0
+_OUTPUT_TIMEOUT = 15.0
 
 T = TypeVar("T")
 

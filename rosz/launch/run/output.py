@@ -34,7 +34,7 @@ _RELAY_TIMEOUT = 5.0
 """Time in seconds for the relay to start, and to end when its screen accepts nothing."""
 _MIN_LIFE = 1.0
 """Time in seconds: a relay that ends sooner is not started again."""
-_READ_TIMEOUT = 1.0
+_READ_TIMEOUT = 4.0
 """Time in seconds to wait for output that is kept, before there counts as none."""
 _SEND_TIMEOUT = 0.5
 """Time in seconds for the relay to receive a request, unless the last one failed."""

@@ -103,6 +103,7 @@ def test_output_is_followed_from_the_screen_and_from_files(
         eventually(lambda: has_come("/shown", "grün\n", "oh\n"), "the output of /shown")
         eventually(lambda: has_come("/kept", "one\n", "oh\n"), "the output of /kept")
         (known,) = client.newest_output("shown")
+        assert "oh\n" in known.text
         assert client.read_output(key, "/shown", known.position).text == ""
         more.write_text("later\n")
         eventually(
@@ -111,7 +112,10 @@ def test_output_is_followed_from_the_screen_and_from_files(
         )
         with pytest.raises(LaunchError, match="this launch has no node '/none'"):
             client.read_output(key, "/none")
-        assert client.read_output(key, "/shown", (-1, 1 << 40)).text.endswith("later\n")
+        eventually(
+            lambda: client.read_output(key, "/shown", (-1, 1 << 40)).text.endswith("later\n"),
+            "what is kept, at a position that is none",
+        )
 
 
 def test_much_output_is_bounded(tmp_path: Path, network: Network, client: StatusClient) -> None:
