@@ -240,6 +240,13 @@ def take_picture(browser: Any, folder: Path, name: str) -> None:
     browser.save_screenshot(str(folder / f"{name}.png"))
 
 
+def _is_so_soon(condition: Callable[[], bool]) -> bool:
+    deadline = time.monotonic() + _ATTEMPT
+    while not condition() and time.monotonic() < deadline:
+        threading.Event().wait(0.01)
+    return condition()
+
+
 class World:
     """A robot, the page that shows it, and a browser."""
 
@@ -289,16 +296,22 @@ class World:
             lambda: self.browser.execute_script(_FILL, selector, text), f"a {selector}", LONG
         )
 
+    def click_until(self, text: str, arrived: Callable[[], bool]) -> None:
+        """Click what has a text, again if the page was not yet complete the first time."""
+
+        def attempt() -> bool:
+            self.browser.execute_script(_CLICK, text)
+            return _is_so_soon(arrived)
+
+        eventually(attempt, f"what '{text}' does", LONG)
+
     def send(self, text: str, button: str, arrived: Callable[[], bool]) -> None:
         """Fill in a form and send it, again if the page was not yet complete the first time."""
 
         def attempt() -> bool:
             self.fill("textarea", text)
             self.click(button)
-            deadline = time.monotonic() + _ATTEMPT
-            while not arrived() and time.monotonic() < deadline:
-                threading.Event().wait(0.01)
-            return arrived()
+            return _is_so_soon(arrived)
 
         eventually(attempt, f"what '{text}' does", LONG)
 

@@ -244,9 +244,8 @@ def test_a_bag_is_recorded_and_played(
     world.open("/bags")
     eventually(lambda: re.search(r"Messages\s+\d\d", world.text), "messages", LONG)
     take_picture(world.browser, folder, "recording-laptop-light")
-    world.click("Stop")
     bag = world.network.folder / "bags" / "run.mcap"
-    eventually(bag.exists, "the finished bag", LONG)
+    world.click_until("Stop", bag.exists)
     world.open("/bags?bag=run.mcap")
     world.should_see("Download", "/chatter", "std_msgs/String")
     size = "return fetch('/bag/run.mcap').then((got) => got.blob()).then((got) => got.size)"
