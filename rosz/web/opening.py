@@ -32,9 +32,11 @@ class Settings(ServerSettings, frozen=True, kw_only=True):
 
     Attributes:
         bags: Folder of the bags that it records, plays and shows.
+        most_pages: Largest number of pages that are open at a time.
     """
 
     port: int = PORT
+    most_pages: int = 200
     bags: Path = Path()
 
 
@@ -63,7 +65,10 @@ def open_page(node: Node, settings: Settings) -> tuple[PageServer, list[str]]:
         permission=Permission(access.permit, settings.read_only),
         bags=settings.bags,
         guard=Guard(
-            access.password, local=is_loopback(settings.host), secure=access.tls is not None
+            access.password,
+            local=is_loopback(settings.host),
+            secure=access.tls is not None,
+            most=settings.most_pages,
         ),
         tls=access.tls,
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from urllib.error import HTTPError
 
 import pytest
-from network import TIMEOUT, Network, Program, eventually
+from network import TIMEOUT, Network, eventually
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
@@ -20,30 +20,27 @@ LONG = 4 * TIMEOUT
 
 
 SERVER = """
-import sys, threading
+import sys
 from rosz.node import Node
-from rosz.web.guard import Guard
-from rosz.web.model import Permission
-from rosz.web.server import PageServer
+from rosz.web import Settings, open_page
 with Node("web") as node:
-    server = PageServer(node, "127.0.0.1", 0, permission=Permission(None, False),
-        guard=Guard(sys.argv[1], most=int(sys.argv[2])))
-    print("the page is at", server.port, flush=True)
+    server, (address, *_) = open_page(node, Settings(port=0, most_pages=int(sys.argv[1])))
+    print("the page is at", address, flush=True)
     sys.stdin.readline()
     server.close()
 """
 MOST = 5
+SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
 
 
 class Pages:
     """A server of few pages, and a node that they show."""
 
-    def __init__(self, network: Network, password: str = "") -> None:
+    def __init__(self, network: Network) -> None:
         self.network = network
         self.node = network.node("robot")
-        self.server: Program = network.program(SERVER, password, str(MOST))
-        self.port = int(self.server.wait_for("the page is at", LONG).split()[-1])
-        self.address = f"http://127.0.0.1:{self.port}"
+        server = network.program(SERVER, str(MOST))
+        self.address = server.wait_for("the page is at", LONG).split()[-1]
 
     def observed(self) -> bool:
         """Return whether a page observes the log."""
@@ -105,7 +102,7 @@ def test_one_that_sleeps(pages: Pages) -> None:
 def test_foreign_pages_and_garbage(pages: Pages) -> None:
     """A websocket of another origin is refused; frames that are no messages end theirs alone."""
     one = Visitor(pages.address, "/graph")
-    place = f"ws://127.0.0.1:{pages.port}/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    place = pages.address.replace("http", "ws", 1) + SOCKET
     with pytest.raises(InvalidStatus, match="403"), connect(place, origin=Origin("http://evil")):
         pass
     garbage = ("x" * 1000, b"\x00" * 1000, '42["event",{"client_id":"none"}]', '42["handshake",5]')
