@@ -299,7 +299,8 @@ class Player:
                     f" '{cls._type}', which get their defaults"
                 )
             name = self._node.resolve(self._options.prefix + channel.topic)
-            made = Publisher(self._node, name, cls, self._qos(channel), waits=True)
+            express = not self._options.immediate
+            made = Publisher(self._node, name, cls, self._qos(channel), waits=True, express=express)
             self._made[key] = self._node.keep(made)
             if channel.topic in map(_absolute, self._options.pause_topics):
                 self._pausing.add(made.name)

@@ -79,6 +79,8 @@ class Publisher(Entity, Generic[M]):
         qos: The QoS that others see.
         waits: Whether a full link makes ``publish`` wait instead of dropping the message, also
             where the QoS keeps only some messages.
+        express: Whether each message is sent at once; it may be held for 1 ms otherwise, so that
+            several are sent together.
         copies: Whether subscriptions of the same process get copies of the messages.
         number: Number of the publisher within the session; by default one that was never used.
         sequence: Sequence number of the last message of the publisher that had the number before.
@@ -97,6 +99,7 @@ class Publisher(Entity, Generic[M]):
         qos: QoS,
         *,
         waits: bool = False,
+        express: bool = False,
         copies: bool = False,
         number: int | None = None,
         sequence: int = 0,
@@ -120,6 +123,7 @@ class Publisher(Entity, Generic[M]):
             self.key,
             reliable=qos.reliable,
             block=self._blocks,
+            express=express,
             cache=qos.depth if qos.latched else 0,
             remote_only=self._local is not None,
         )

@@ -189,6 +189,7 @@ class Session:
         *,
         reliable: bool = True,
         block: bool = False,
+        express: bool = False,
         cache: int = 0,
         remote_only: bool = False,
     ) -> RawPublisher:
@@ -198,12 +199,13 @@ class Session:
             key: The key expression to publish on.
             reliable: Whether links should be reliable.
             block: Whether a full link makes ``put`` wait instead of dropping the sample.
+            express: Whether a sample never waits for others to be sent together.
             cache: The number of samples kept for late joiners (transient local); 0 for none.
             remote_only: Whether subscribers of this session receive nothing, but from the cache.
         """
         reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
         qos: Any = {"congestion_control": _CONGESTION[block], "reliability": reliability}
-        qos["allowed_destination"] = _ORIGIN[remote_only]
+        qos |= {"allowed_destination": _ORIGIN[remote_only], "express": express}
         self._lifecycle.check_open(f"publish on '{key}'")
         with translate_errors(f"publish on '{key}'"):
             if not cache:

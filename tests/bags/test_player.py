@@ -136,6 +136,24 @@ def test_a_part_of_some_topics_under_a_prefix(network: Network, tmp_path: Path) 
     ]
 
 
+@pytest.mark.parametrize("immediate", [False, True])
+def test_messages_with_a_time_are_sent_at_once(
+    network: Network, tmp_path: Path, immediate: bool
+) -> None:
+    """Zenoh may hold others for a millisecond, to send several together."""
+    bag = _bag(tmp_path / "a.mcap", [("/a", 0.0, Int32(data=7))])
+    found: list[bool] = []
+    heard = _Listener(network, "/a")
+    heard.node.keep(
+        heard.node.context.session.subscriber(
+            "*/a/**", lambda sample: found.append(sample.raw.express)
+        )
+    )
+    _player(network, bag, immediate=immediate).run()
+    eventually(lambda: found)
+    assert found == [not immediate]
+
+
 def test_remapping_renames_topics(network: Network, tmp_path: Path) -> None:
     bag = _bag(tmp_path / "a.mcap", [("/a", 0.0, Int32(data=7))])
     heard = _Listener(network, "/other")
