@@ -2,7 +2,7 @@
 
 What of a line cannot be as it stands:
 
-- ``rosrun rqt_graph rqt_graph`` and ``rqt_graph``: no windows of ROS 1's;
+- ``rosrun rqt_graph rqt_graph`` and ``rqt_graph`` open a page in place of a window;
 - ``rosparam list`` without a core: ``ERROR: Unable to communicate with master!`` is not said, there
   is no master; it prints what there is, which is nothing;
 - ``/rosdistro: kinetic``: other values; ``/roslaunch/uris/…`` comes with a launch, not with a core;
