@@ -10,7 +10,7 @@ import linecache
 from collections.abc import Callable
 from importlib.abc import Loader
 from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
+from importlib.util import cache_from_source, module_from_spec, spec_from_loader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -70,6 +70,8 @@ def _write(file: Path, source: str) -> bool:
         ) as temporary:
             temporary.write(source)
         Path(temporary.name).replace(file)
+        # Python takes compiled code for that of a source of the same size and second.
+        Path(cache_from_source(file)).unlink(missing_ok=True)
     except OSError:
         return False  # a read-only home: the source stays in memory
     return True
