@@ -22,7 +22,16 @@ from rosz.doctor.machine import stopped_note
 from rosz.errors import DecodeError
 from rosz.introspect.survey import Survey, process_address, take_survey
 from rosz.node import NodeInfo, Request, control_key
-from rosz.params.wire import Keys, Member, SyncReply, SyncRequest, decode, encode
+from rosz.params.wire import (
+    BUCKETS,
+    Keys,
+    Member,
+    SyncReply,
+    SyncRequest,
+    decode,
+    encode,
+    read_digest,
+)
 from rosz.session import Sample, Session, find_waiting, why_refused
 from rosz.wire import Kind, Token, entity_key, read_attachment
 
@@ -317,19 +326,19 @@ _TIMEOUT = 1.0
 _ADMIN_SECONDS = 0.5
 _LOOKS = 4
 _PAUSE = 0.25
-_BUCKET = 8
 _VERSION = re.compile(r"v?(\d+)\.(\d+)")
 
 
 def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
     """Find parameter replicas that differ from the others, or do not reply."""
     keys = Keys(domain)
+    digests: dict[str, list[int]] = {}
     for look in range(_LOOKS):
         if look:
             time.sleep(_PAUSE)  # a write on its way reaches all meanwhile
         members = [keys.member(token) for token in session.live_tokens(keys.tokens, _TIMEOUT)]
-        digests = _digests(session, keys, members)
-        if len(members) == len(digests) and len(set(digests.values())) <= 1:
+        before, digests = digests, _digests(session, keys, members)
+        if len(members) == len(digests) and len(set(map(tuple, digests.values()))) <= 1:
             return
     silent = [member for member in members if member.zid not in digests]
     if silent:
@@ -339,24 +348,22 @@ def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
             sorted(f"{member.label} (session {member.zid})" for member in silent),
             "they hang or are stopped: let them go on, or end them",
         )
-    counts = Counter(digests.values())
-    if len(counts) > 1:
-        usual = counts.most_common(1)[0][0]
+    lines = sorted(
+        f"{member.label} (session {member.zid}): other writes in {count} of {BUCKETS} buckets"
+        for member in members
+        if (count := _differing(member.zid, before, digests))
+    )
+    if lines:
         yield error(
             "replica-out-of-step",
             "replicas of the parameters differ, and stay so",
-            sorted(
-                f"{member.label} (session {member.zid}): other writes in"
-                f" {_differing(usual, digests[member.zid])} of {len(usual) // _BUCKET} buckets"
-                for member in members
-                if digests.get(member.zid, usual) != usual
-            ),
+            lines,
             "it does not hear what the others write, or they do not hear it: check the link to its"
             " machine, then start it again",
         )
 
 
-def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, bytes]:
+def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, list[int]]:
     """Query all replicas at once, and return their digests by session."""
     request = encode(SyncRequest())
     asked = {
@@ -364,18 +371,23 @@ def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, b
         for member in members
     }
     return {
-        zid: decode(reply.payload, SyncReply).digest
+        zid: read_digest(decode(reply.payload, SyncReply).digest)
         for zid, replies in asked.items()
         for reply in replies
         if reply.ok
     }
 
 
-def _differing(one: bytes, other: bytes) -> int:
-    return sum(
-        one[start : start + _BUCKET] != other[start : start + _BUCKET]
-        for start in range(0, max(len(one), len(other)), _BUCKET)
-    )
+def _differing(zid: str, before: dict[str, list[int]], now: dict[str, list[int]]) -> int:
+    """Return how many buckets of a replica differ from those of most, and have not changed.
+
+    Where somebody writes all the time, buckets differ at each look, and change between them.
+    """
+    if zid not in before or zid not in now:
+        return 0
+    (usual, _) = Counter(map(tuple, now.values())).most_common(1)[0]
+    numbers = zip(before[zid], now[zid], usual, strict=True)
+    return sum(own == past != most for past, own, most in numbers)
 
 
 def check_versions(session: Session) -> Iterator[Finding]:

@@ -30,15 +30,14 @@ Two replicas with different digests exchange the buckets that differ, and nothin
 
 from __future__ import annotations
 
-import struct
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
-from rosz.errors import DecodeError
 from rosz.params.paths import ROOT, Path
 from rosz.params.tree import MISSING, Draft, Missing, Tree, lookup
 from rosz.params.values import Value
+from rosz.params.wire import BUCKETS, pack_digest, read_digest
 from rosz.params.writes import DELETED, Deleted, Order, Write, check_write, put
 
 try:
@@ -47,13 +46,10 @@ try:
 except ImportError:
     from hashlib import blake2b
 
-__all__ = ("BUCKETS", "EMPTY_DIGEST", "Differences", "History", "Merge")
+__all__ = ("EMPTY_DIGEST", "Differences", "History", "Merge")
 
-BUCKETS: Final = 64
 _MAX_TOGGLED: Final = 1000
-_DIGEST: Final = struct.Struct(f"<{BUCKETS}Q")
-_FASTEST: Final = 1
-EMPTY_DIGEST: Final = zlib.compress(bytes(_DIGEST.size), _FASTEST)
+EMPTY_DIGEST: Final = b""
 """The digest of the empty set."""
 
 
@@ -169,11 +165,8 @@ class History:
         return (write for write in self.writes() if _bucket_of("/".join(write.path)) == index)
 
     def digest(self) -> bytes:
-        """Return the digest of the set, in the form that replicas exchange.
-
-        It is compressed, since with few parameters most of it is zeros.
-        """
-        return zlib.compress(_DIGEST.pack(*self._numbers()), _FASTEST)
+        """Return the digest of the set, in the form that replicas exchange."""
+        return pack_digest(self._numbers())
 
     def differing(self, digest: bytes) -> list[int]:
         """Return the buckets in which this set differs from the set of another digest.
@@ -181,13 +174,7 @@ class History:
         Raises:
             DecodeError: The bytes are not a digest.
         """
-        try:
-            content = zlib.decompressobj().decompress(digest, _DIGEST.size + 1)
-        except zlib.error as error:
-            raise DecodeError("digest", 0, str(error)) from error
-        if len(content) != _DIGEST.size:
-            raise DecodeError("digest", 0, f"{len(content)} bytes, expected {_DIGEST.size}")
-        theirs = _DIGEST.unpack(content)
+        theirs = read_digest(digest)
         return [index for index, ours in enumerate(self._numbers()) if ours != theirs[index]]
 
     def compare(

@@ -48,7 +48,7 @@ from __future__ import annotations
 
 import datetime as dt
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Final, Literal, TypeVar
 
 import msgspec
@@ -60,6 +60,7 @@ from rosz.params.writes import DELETED, Change, Write, put
 from rosz.wire import own_key
 
 __all__ = (
+    "BUCKETS",
     "Batch",
     "ClientReply",
     "ClientRequest",
@@ -77,12 +78,18 @@ __all__ = (
     "encode",
     "encode_value",
     "join_path",
+    "pack_digest",
     "pack_value",
+    "read_digest",
     "read_header",
     "read_time",
     "split_path",
 )
 
+BUCKETS: Final = 64
+"""Buckets of a digest."""
+
+_BUCKET: Final = struct.Struct("<BQ")
 _REPLICA: Final = "replica"
 _ELDER: Final = "elder"
 _MOMENT: Final = 1
@@ -333,6 +340,27 @@ class Index(msgspec.Struct, array_like=True):
             DecodeError: A path has an empty part.
         """
         return self.buckets, {split_path(path): (time, clock) for path, time, clock in self.entries}
+
+
+def pack_digest(numbers: Sequence[int]) -> bytes:
+    """Return a digest: the index and the number of each bucket whose number is not 0."""
+    return b"".join(_BUCKET.pack(index, number) for index, number in enumerate(numbers) if number)
+
+
+def read_digest(digest: bytes) -> list[int]:
+    """Return the number of each bucket of a digest.
+
+    Raises:
+        DecodeError: The bytes are not a digest.
+    """
+    if len(digest) % _BUCKET.size:
+        raise DecodeError("digest", 0, f"{len(digest)} bytes, expected {_BUCKET.size} each bucket")
+    numbers = [0] * BUCKETS
+    for at, (index, number) in enumerate(_BUCKET.iter_unpack(digest)):
+        if index >= BUCKETS:
+            raise DecodeError("digest", at * _BUCKET.size, f"bucket {index} of {BUCKETS}")
+        numbers[index] = number
+    return numbers
 
 
 class SyncRequest(msgspec.Struct, omit_defaults=True):

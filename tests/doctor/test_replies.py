@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -217,7 +218,7 @@ def test_a_replica_out_of_step(doctor: Doctor, network: Network) -> None:
     for name in ("one", "two"):
         network.node(name).params["/speed"] = 3
     session, keys = network.session(), Keys(network.domain)
-    odd = SyncReply(digest=b"\1" * 512)
+    odd = SyncReply(digest=b"".join(struct.pack("<BQ", index, 1) for index in range(64)))
     answering(network, session, keys.of(session.zid, "sync"), encode(odd))
     network._keep(session.token(keys.token(Member(1, session.zid, "odd one"))))
     eventually(lambda: len(session.peers()) == 2, "links to both")

@@ -25,6 +25,7 @@ from rosz.params.wire import (
     decode_value,
     encode,
     encode_value,
+    read_digest,
     read_header,
 )
 from rosz.params.writes import DELETED, Write
@@ -186,3 +187,9 @@ def test_tokens_carry_the_replica() -> None:
 )
 def test_key_expressions(expression: str, key: str, expected: bool) -> None:
     assert is_key_in(expression, key) is expected
+
+
+@pytest.mark.parametrize("content", [b"x", b"\x40" + bytes(8)])
+def test_what_is_no_digest_is_refused(content: bytes) -> None:
+    with pytest.raises(DecodeError, match="^digest at byte 0: "):
+        read_digest(content)
