@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 
 import zenoh
@@ -11,6 +12,9 @@ from rosz.session.declared import Declared
 from rosz.session.queries import Replies
 
 __all__ = ("TokenWatch",)
+
+_UNSETTLED_SECONDS = 10.0
+"""Seconds from its beginning in which a watch may be told of the end of a token first."""
 
 
 class TokenWatch:
@@ -46,6 +50,7 @@ class TokenWatch:
         self._seen: set[str] = set()
         self._appeared: set[str] = set()
         self._gone: set[str] = set()
+        self._settled = time.monotonic() + _UNSETTLED_SECONDS
 
     def begin(self) -> None:
         """Wait for the tokens that a query finds."""
@@ -57,8 +62,11 @@ class TokenWatch:
     def deliver(self, sample: zenoh.Sample) -> None:
         """Report that a token appeared or disappeared."""
         token, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-        if self.complete is not None:
-            self._note(token, alive=alive)
+        self._note(token, alive=alive)
+        # Before the watch is complete, one query for all of these comes at the end.
+        ended = alive and self.complete is None and token in self._gone
+        if ended and token not in self._alive({token}):
+            return
         own = self._own.get(token)
         # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
         if alive or own is None or own.closed:
@@ -67,14 +75,35 @@ class TokenWatch:
     def idle(self) -> None:
         """Report that what existed is complete, if it is."""
         report = self.complete
-        if report is not None and self._missing <= self._seen:
+        if report is not None and self._is_complete():
             for token in self._vanished():
                 self._callback(token, False)
             self.complete = None
             report()
 
+    def _is_complete(self) -> bool:
+        """Return whether all tokens of the query have been reported, but those that ended before.
+
+        The watch is not told of a token whose process died while the watch began.
+        """
+        missing = self._missing - self._seen
+        if missing:
+            self._missing = missing.intersection(self._alive(missing))
+        return self._missing <= self._seen
+
+    def _alive(self, otherwise: set[str]) -> set[str]:
+        try:
+            return set(self._live())
+        except (ClosedError, TransportError):
+            return otherwise  # the watch ends with its session
+
     def _note(self, token: str, *, alive: bool) -> None:
-        self._seen.add(token)
+        if self.complete is not None:
+            self._seen.add(token)
+        elif time.monotonic() > self._settled:
+            self._appeared.clear()
+            self._gone.clear()
+            return
         if alive:
             self._appeared.add(token)
         else:
@@ -84,9 +113,4 @@ class TokenWatch:
     def _vanished(self) -> set[str]:
         """Return the tokens that have disappeared unnoticed."""
         doubtful = self._appeared & self._gone
-        if not doubtful:
-            return doubtful
-        try:
-            return doubtful.difference(self._live())
-        except (ClosedError, TransportError):
-            return set()  # the watch ends with its session
+        return doubtful - self._alive(doubtful) if doubtful else doubtful

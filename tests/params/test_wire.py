@@ -191,5 +191,5 @@ def test_key_expressions(expression: str, key: str, expected: bool) -> None:
 
 @pytest.mark.parametrize("content", [b"x", b"\x40" + bytes(8)])
 def test_what_is_no_digest_is_refused(content: bytes) -> None:
-    with pytest.raises(DecodeError, match="^digest at byte 0: "):
+    with pytest.raises(DecodeError, match="digest at byte 0: "):
         read_digest(content)
