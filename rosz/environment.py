@@ -30,7 +30,7 @@ _MAX_DOMAIN = 232
 _CATKIN_MARKER = ".catkin"
 _PRIVATE = "private"
 _WINDOWS = Path(__file__).parent / "web" / "windows"
-"""Where the packages are that show pages in place of ROS 1's windows."""
+"""The folder of the packages whose programs open pages in place of rqt and rviz."""
 _USER_FOLDERS = Path("/run/user")
 """Where systemd makes a folder for each user who is logged in."""
 

@@ -87,7 +87,7 @@ class Buffer(Generic[T]):
 
 
 class Channels:
-    """How many messages may wait in Zenoh's channel of each topic.
+    """The capacity of each topic's Zenoh channel, so that all together keep to a bound.
 
     Topics with large messages share a number of bytes. Sizes and numbers are rounded to powers of
     two, so that they change rarely.

@@ -187,7 +187,7 @@ def _obey(player: Player, command: BagCommand) -> None:
 def _main() -> None:
     """Do what the first line says."""
     reports = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what the log of the node prints is no report
+    os.dup2(2, 1)  # only reports go to the page; the node's log goes to standard error
     # Unbuffered, since the thread that waits for a line must not hold a lock when the process ends.
     line = _Line(os.fdopen(os.dup(0), "rb", buffering=0), reports)
     order = line.order()

@@ -58,7 +58,7 @@ def test_only_bags_of_the_folder_are_reachable(folder: Path) -> None:
     for name in ("../outside.mcap", "link.mcap", "folder", "notes.txt", "other", "", ".", ".."):
         uses: list[Callable[[str], object]] = [bags.folder.summary, bags.open, bags.delete]
         for use in uses:
-            with pytest.raises(NotFoundError, match="there is no bag"):
+            with pytest.raises(NotFoundError, match="has no bag"):
                 use(name)
     assert (folder.parent / "outside.mcap").exists()
     with pytest.raises(UsageError, match="is not finished"):

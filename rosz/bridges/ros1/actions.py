@@ -40,7 +40,7 @@ _Gateway = ActionGateway | ServiceGateway
 
 
 class _Sides(msgspec.Struct):
-    """What ROS 1 has of an action.
+    """The ROS 1 nodes that use an action.
 
     Attributes:
         type_name: Type of the goal messages; empty if it is not known yet.

@@ -105,7 +105,7 @@ class SentGoal:
         done: Whether it has ended.
         began: Time at which it was sent, in seconds since 1970.
         result: Result as text; empty while there is none.
-        fault: Why there is no result; empty if there is one.
+        fault: Reason why the goal has no result; empty if there is none.
         feedbacks: Number of messages of feedback.
     """
 

@@ -1,4 +1,4 @@
-"""What the page and its process for bags say to each other; see ``rosz.web.bag_process``."""
+"""The messages between the page and the process that records or plays (`rosz.web.bag_process`)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class PlayOrder(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BagOrder(msgspec.Struct, frozen=True):
-    """The first line: what the process does."""
+    """The first line to the process: a bag to record, or one to play."""
 
     record: RecordOrder | None = None
     play: PlayOrder | None = None
@@ -64,7 +64,7 @@ class BagCommand(msgspec.Struct, frozen=True):
     """A further line.
 
     Attributes:
-        do: What to do.
+        do: The action to take.
         value: Seconds of the bag to jump to, or the rate, or whether to loop.
     """
 
@@ -73,7 +73,7 @@ class BagCommand(msgspec.Struct, frozen=True):
 
 
 class BagReport(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A line of the process: how far it is, or something to say.
+    """A line from the process: its progress, or a sentence for the user.
 
     Attributes:
         said: A sentence for the user.

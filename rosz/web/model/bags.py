@@ -90,7 +90,7 @@ class BagFolder:
             NotFoundError: The folder has no such bag.
         """
         if not any(one.name == name for one in self.rows()):
-            raise NotFoundError(f"there is no bag '{name}' in '{self.path}'")
+            raise NotFoundError(f"folder '{self.path}' has no bag '{name}'")
         return self.path / name
 
     def summary(self, name: str) -> tuple[Summary, list[str]]:
@@ -297,7 +297,7 @@ class Bags:
         """Begin to record into a bag of the folder; the time is its name if it has none.
 
         Raises:
-            UsageError: The page may not, or the name is no name of a bag, or it records already.
+            UsageError: The page may not record, the name is not valid, or a recording is running.
             BagError: The process cannot be started.
         """
         self._permission.check_files("record bags")

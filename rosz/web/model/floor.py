@@ -29,7 +29,7 @@ _TYPES = {"odom": "nav_msgs/Odometry", "scan": "sensor_msgs/LaserScan"}
 
 
 class Surroundings:
-    """What a robot has seen, and where it was; pure and bounded.
+    """The path of a robot and the points that its laser has seen; bounded in number.
 
     Attributes:
         pose: X and y in metres and heading in rad; None before the first one.
@@ -126,7 +126,7 @@ def find_floor(survey: Survey, topic: str) -> dict[str, str]:
 
 
 class FloorPlan:
-    """What a robot sees, followed until it is closed.
+    """A picture of a robot's surroundings, made from its odometry and laser until it is closed.
 
     Args:
         node: The node that subscribes.

@@ -74,7 +74,7 @@ class Frames:
         if not frame:
             return "the message has no frame_id"
         if not fixed:
-            return "there is no fixed frame"
+            return "no fixed frame is chosen"
         try:
             self.find(fixed, frame, stamp)
         except TransformError as error:

@@ -120,7 +120,7 @@ class _BagsPage:
 
 
 class _Recorder:
-    """What to record, and how the recording goes."""
+    """The card that starts a recording, shows its progress, and stops it."""
 
     def __init__(self, system: System, frame: Frame) -> None:
         self._bags: Bags = system.bags

@@ -48,7 +48,10 @@ class Wanted(msgspec.Struct, frozen=True):
     end: str = ""
 
     def times(self) -> tuple[float, float]:
-        """Return the times in seconds since the Unix epoch; what is no time is left open."""
+        """Return both times in seconds since the Unix epoch.
+
+        A text that is not a time sets no limit.
+        """
         today = dt.datetime.now().astimezone()
         found = [0.0, math.inf]
         for number, text in enumerate((self.begin, self.end)):

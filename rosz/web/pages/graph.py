@@ -91,11 +91,11 @@ def show_graph(
 
 
 class _Shown(NamedTuple):
-    """What is drawn.
+    """The state of the drawing.
 
     Args:
         picture: Boxes and arrows.
-        written: What is written on arrows.
+        written: Labels of the arrows.
         chosen: Key of the box that is emphasised.
     """
 

@@ -20,7 +20,7 @@ _MOVE = "move"
 
 
 class _Pointer(Object3D, component=Path(__file__).with_name("pointer.js")):
-    """What the browser does with the pointer while a tool is taken."""
+    """Handles the pointer in the browser while a tool is selected."""
 
     def __init__(self) -> None:
         super().__init__("")
@@ -103,7 +103,7 @@ class Pointing:
     def _send(self, name: str, point: tuple[float, float, float], yaw: float) -> None:
         frame = self._fixed()
         if not frame:
-            ui.notify("there is no fixed frame yet: choose one", type="negative")
+            ui.notify("no fixed frame is chosen: choose one", type="negative")
             return
         try:
             self._tools.send(name, frame, point, yaw)

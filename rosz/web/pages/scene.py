@@ -37,7 +37,7 @@ _CHOICES = {
     "sensor_msgs/PointCloud": _CLOUDS,
     "sensor_msgs/PointCloud2": _CLOUDS,
 }
-"""What colors can stand for, by type."""
+"""The meanings that the color of a display can have, by its type."""
 _MARKERS = ("Robot", "visualization_msgs/Marker", "visualization_msgs/MarkerArray")
 _OWN_COLORS = frozenset({"Frames", "nav_msgs/OccupancyGrid", *_MARKERS})
 _OWN_SIZES = frozenset({"nav_msgs/OccupancyGrid", "sensor_msgs/Range", *_MARKERS})
@@ -180,7 +180,7 @@ class _ScenePage:
         self._show(Look(name, color if kind in _NEED_COLOR else ""))
         self._changed()
 
-    # What the address holds.
+    # The address of the page.
 
     def _changed(self) -> None:
         looks = tuple(shown.look for shown in self._shown)
@@ -199,7 +199,7 @@ class _ScenePage:
             self._scene.move_camera(-5.0, -5.0, 4.5, 0.0, 0.0, 0.0)
         self._changed()
 
-    # What is going on.
+    # Lists and states.
 
     def _refresh_lists(self) -> None:
         shown = {one.look.name for one in self._shown}

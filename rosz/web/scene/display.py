@@ -54,13 +54,13 @@ _NOW = frozenset({"nav_msgs/OccupancyGrid"})
 
 
 class Display(Protocol):
-    """What draws something into the view.
+    """A part of the view that draws one topic, the grid, the frames or the robot.
 
     Attributes:
         look: Its settings.
-        kind: What it shows.
-        status: What it draws at present.
-        fault: Why it does not; empty if it does.
+        kind: Type of its messages, or ``Grid``, ``Frames`` or ``Robot``.
+        status: Description of its present drawing.
+        fault: Reason why it draws nothing; empty if it draws.
     """
 
     look: Look

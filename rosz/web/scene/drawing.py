@@ -1,4 +1,4 @@
-"""What a display draws, in the coordinates of the fixed frame, as bytes for the browser.
+"""The drawing of a display, in the coordinates of the fixed frame, as bytes for the browser.
 
 A drawing is a header in JSON, whose length in four bytes comes first, and the numbers of its parts,
 as the graphics processor takes them. ``pages/drawing.js`` reads it.

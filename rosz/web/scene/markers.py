@@ -83,7 +83,7 @@ class MarkerDisplay:
         self._shown: tuple[Any, ...] = ()
         self._subscription: Any = None
 
-    # What comes.
+    # Receiving messages.
 
     def _receive(self, message: Any) -> None:
         now = self._node.now()
@@ -108,7 +108,7 @@ class MarkerDisplay:
         else:
             self._refused = f"marker {marker.ns}/{marker.id} has the unknown action {marker.action}"
 
-    # What is drawn.
+    # Drawing.
 
     def refresh(self, fixed: str) -> bool:
         """Find where the markers are; return whether there is something new to draw."""

@@ -108,7 +108,7 @@ class Meshes:
 
 
 class _Resolver:
-    """What a mesh refers to, from its folder and those below its package.
+    """Loads the files that a mesh refers to, from its folder and its package.
 
     Args:
         uri: URI of the mesh.

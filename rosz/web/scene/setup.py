@@ -1,4 +1,4 @@
-"""What the view shows, as its address holds it.
+"""The settings of the view, as the address of the page holds them.
 
 ``/3d?frame=map&show=grid,tf,/scan;color=%23ff0000;size=4,/map;hidden`` names the fixed frame and
 the displays, with commas between; a display is the name of a topic, or ``grid``, ``tf`` or
@@ -36,7 +36,7 @@ class Look(msgspec.Struct, frozen=True):
 
 
 class Setup(msgspec.Struct, frozen=True):
-    """What the view shows.
+    """The settings of the view.
 
     Attributes:
         frame: The fixed frame; empty to choose one.
