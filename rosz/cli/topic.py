@@ -208,10 +208,9 @@ def echo_command(
 
 def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
     """Wait for a topic, or a field, and return it with a token of the topic."""
-    from rosz.introspect.subscribe import find_token, resolve_field, wait_for_target
+    from rosz.introspect.subscribe import resolve_field, wait_for_target
 
-    target = wait_for_target(node.context, resolve_field(name, node.resolve), warn)
-    return target, find_token(node.context.graph.refresh(), target.topic, target.type_name)
+    return wait_for_target(node.context, resolve_field(name, node.resolve), warn)
 
 
 def _text(

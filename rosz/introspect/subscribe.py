@@ -55,7 +55,9 @@ def topic_types(view: View) -> Mapping[str, Sequence[str]]:
     return found
 
 
-def wait_for_target(context: Context, name: str, warn: Callable[[str], object]) -> Target:
+def wait_for_target(
+    context: Context, name: str, warn: Callable[[str], object]
+) -> tuple[Target, Token]:
     """Return the topic, or the topic and the field, of a name; wait while there is none.
 
     Args:
@@ -63,21 +65,29 @@ def wait_for_target(context: Context, name: str, warn: Callable[[str], object]) 
         name: Global name, fields and indices included.
         warn: Function called with a sentence if it has to wait.
 
+    Returns:
+        The topic or the field, and a token of the topic.
+
     Raises:
         ClosedError: The context is shut down meanwhile.
     """
     load = context.types.message
+
+    def find(view: View) -> tuple[Target, Token]:
+        target = find_target(name, topic_types(view), load)
+        return target, find_token(view, target.topic, target.type_name)
+
     with suppress(NotFoundError):
-        return find_target(name, topic_types(context.graph.refresh()), load)
+        return find(context.graph.refresh())
     try:  # on a busy machine, the query may have ended before all have replied
-        return find_target(name, topic_types(context.graph.view()), load)
+        return find(context.graph.view())
     except NotFoundError as error:
         warn(f"topic [{name}] does not appear to be published yet ({error})")
-    found: list[Target] = []
+    found: list[tuple[Target, Token]] = []
 
     def look(view: View) -> bool:
         try:
-            found.append(find_target(name, topic_types(view), load))
+            found.append(find(view))
         except NotFoundError:
             return False
         return True

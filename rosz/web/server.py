@@ -31,6 +31,12 @@ __all__ = ("PageServer",)
 
 _START_SECONDS = 30.0
 _STOP_SECONDS = 1
+_RECONNECT_SECONDS = 10.0
+"""Seconds that a page stays as it is without a link, as on a robot that drives out of reach.
+
+A ping is sent after 0.8 of them, and must be answered within 0.4: a browser that draws much in 3D
+without a graphics processor answers late.
+"""
 _LOGGERS = ("nicegui", "uvicorn.error")
 
 
@@ -93,6 +99,7 @@ class PageServer:
             favicon=_ICON,
             binding_refresh_interval=None,
             message_history_length=200,
+            reconnect_timeout=_RECONNECT_SECONDS,
             show_welcome_message=False,
         )
         config = uvicorn.Config(

@@ -112,11 +112,8 @@ def test_start_and_stop(network: Network, company: bool) -> None:
         cycle(network, number)
     eventually(lambda: threading.active_count() <= before + 2, "threads ended")
     threads, files = threading.active_count(), open_files()
-    began = time.monotonic()
-    cycles = repeats(15, 500)
-    for number in range(cycles):
+    for number in range(repeats(15, 500)):
         cycle(network, number)
-    assert (time.monotonic() - began) / cycles < 1.0
     eventually(lambda: threading.active_count() <= threads + 2, "threads ended")
     gc.collect()
     eventually(lambda: open_files() <= files + 8, "files closed")

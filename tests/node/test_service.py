@@ -199,12 +199,17 @@ def test_no_such_number_of_threads(server: Node, threads: Any) -> None:
         server.service("add", AddTwoInts, lambda _: 0, threads=threads)
 
 
+def threads_for(name: str) -> list[str]:
+    """Return the names of the threads that serve or follow a name."""
+    return [one.name for one in threading.enumerate() if name in one.name]
+
+
 def test_threads_end_with_the_service(server: Node) -> None:
-    before = threading.active_count()
     service = server.service("add", AddTwoInts, lambda _: 0)
     client = server.client("add", AddTwoInts)
     client.wait_for_service()
     client(0, 0)
+    assert len(threads_for("add")) > 1
     client.close()  # it follows the servers
     service.close()
-    eventually(lambda: threading.active_count() <= before, "its threads ended")
+    eventually(lambda: not threads_for("add"), "its threads ended")

@@ -149,6 +149,9 @@ def test_a_browser_restarts_a_node_and_follows_its_output(
         world.press("Restart /talker")
         eventually(lambda: site.pid("/talker") not in {0, first}, "another talker", LONG)
         world.should_see("/talker runs again")
+        # Among the nodes too, where the button belongs to one process.
+        pid = str(site.pid("/talker"))
+        eventually(lambda: world.text.count(pid) > 1, "the other talker on the page", LONG)
         world.press("End /talker")
         world.should_see("as by rosnode kill")
         world.click("End")

@@ -34,7 +34,7 @@ export default class Drawing {
       while (this.wanted !== this.shown) {
         const next = this.wanted;
         const response = await fetch(window.path_prefix + next);
-        if (response.ok) this.draw(await response.arrayBuffer());
+        if (response.status === 200) this.draw(await response.arrayBuffer());
         this.shown = next;
       }
     } catch (error) {

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from rosz.errors import NotFoundError
 from rosz.introspect.nodes import NodeEntry, find_nodes, kill, list_nodes, machines
 from rosz.introspect.survey import Survey
 from rosz.introspect.topics import list_topics
@@ -246,9 +247,12 @@ class _Tables:
 
         def act() -> None:
             system.permission.check_control(name)
-            for token in find_nodes(self._survey, name):
-                if key.startswith(f"{name} {token.zid} "):
-                    kill(session, token, "ended from a page")
+            tokens = find_nodes(self._survey, name)
+            running = [one for one in tokens if key.startswith(f"{name} {one.zid} ")]
+            if not running:
+                raise NotFoundError(f"this process of node '{name}' has ended already")
+            for token in running:
+                kill(session, token, "ended from a page")
 
         with self._box:
             text = "It is asked to shut down, as by rosnode kill. A launch may start it again."

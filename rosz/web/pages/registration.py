@@ -119,7 +119,8 @@ def _add_pictures(system: System) -> None:
         except RoszError as error:
             return Response(str(error), status_code=503, headers=_FRESH)
         if found is None:
-            return Response("this picture is gone", status_code=404, headers=_FRESH)
+            # The view was removed while the browser asked; it would report any error.
+            return Response(status_code=204, headers=_FRESH)
         return Response(found[0], media_type=found[1], headers=_FRESH)
 
 
