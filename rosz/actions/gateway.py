@@ -15,6 +15,7 @@ from rosz.actions.ros2_server import Ros2Server
 from rosz.actions.server import ActionServer, ServerGoal
 from rosz.actions.types import RUNNING, ActionTypes
 from rosz.errors import UsageError
+from rosz.message import Action
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
 from rosz.node import Node
 from rosz.node.action_server import ServerGoal as NativeGoal
@@ -23,6 +24,14 @@ __all__ = ("ActionGateway", "ServiceGateway")
 
 
 _ENDED = "the gateway to the server ended"
+
+
+def _find_types(node: Node, action_type: type[Any]) -> tuple[ActionTypes, type[Action]]:
+    """Return the message classes of an action, and its class for ROS 2."""
+    types = ActionTypes.of(action_type, node.context.types)
+    if types.action is None:
+        raise UsageError(f"the definition of {action_type._type} is not found")
+    return types, types.action
 
 
 class ActionGateway:
@@ -38,10 +47,8 @@ class ActionGateway:
     """
 
     def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
-        types = ActionTypes.of(action_type, node.context.types)
-        if types.action is None:
-            raise UsageError(f"the definition of {action_type._type} is not found")
-        self._client = Ros2Client(node, name, types, types.action)
+        types, action = _find_types(node, action_type)
+        self._client = Ros2Client(node, name, types, action)
         self._goals: dict[str, _Goal] = {}
         self._server = ActionServer(
             node, name, action_type, self._receive, self._cancel, has_ros2=False
@@ -120,10 +127,7 @@ class ServiceGateway:
     """
 
     def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
-        types = ActionTypes.of(action_type, node.context.types)
-        if types.action is None:
-            raise UsageError(f"the definition of {action_type._type} is not found")
-        self._types, self._action = types, types.action
+        self._types, self._action = _find_types(node, action_type)
         self._client = ActionClient(node, name, action_type, has_ros2=False)
         self._lock = threading.Lock()
         self._goals: dict[str, ClientGoal] = {}

@@ -22,6 +22,7 @@ from rosz.msgs.geometry_msgs.msg import Point, Pose, Quaternion
 from rosz.msgs.nav_msgs.msg import MapMetaData, OccupancyGrid
 from rosz.msgs.nav_msgs.srv import GetMap, LoadMap
 from rosz.node import Node, serve_loggers
+from rosz.transforms import to_rpy
 
 __all__ = ("Image", "MapError", "load_map", "main", "occupancy", "read_image", "save", "write_map")
 
@@ -306,9 +307,7 @@ def write_map(grid: OccupancyGrid, name: str, *, occupied: int, free: int) -> No
     head = f"P5\n# CREATOR: rosz map_saver {info.resolution:.3f} m/pix\n"
     head += f"{info.width} {info.height}\n255\n"
     at, turn = info.origin.position, info.origin.orientation
-    yaw = math.atan2(
-        2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y * turn.y + turn.z * turn.z)
-    )
+    _, _, yaw = to_rpy((turn.x, turn.y, turn.z, turn.w))
     text = (
         f"image: {name}.pgm\nresolution: {info.resolution:f}\n"
         f"origin: [{at.x:f}, {at.y:f}, {yaw:f}]\n"

@@ -14,6 +14,7 @@ from math import isnan
 from typing import Any, cast
 
 from rosz.msgs.sensor_msgs.msg import PointCloud2, PointField
+from rosz.transforms import FIELD_FORMATS
 
 __all__ = (
     "PointCloud2",
@@ -23,17 +24,6 @@ __all__ = (
     "read_points",
     "read_points_list",
 )
-
-_DATATYPES = {
-    PointField.INT8: ("b", 1),
-    PointField.UINT8: ("B", 1),
-    PointField.INT16: ("h", 2),
-    PointField.UINT16: ("H", 2),
-    PointField.INT32: ("i", 4),
-    PointField.UINT32: ("I", 4),
-    PointField.FLOAT32: ("f", 4),
-    PointField.FLOAT64: ("d", 8),
-}
 
 
 def read_points(
@@ -138,12 +128,12 @@ def _get_struct_fmt(
         if end < field.offset:
             layout += f"{field.offset - end}x"
             end = field.offset
-        if field.datatype not in _DATATYPES:
+        code = FIELD_FORMATS.get(field.datatype)
+        if code is None:
             sys.stderr.write(f"field '{field.name}' has no known datatype: {field.datatype}\n")
             continue
-        code, size = _DATATYPES[field.datatype]
         layout += code * field.count
-        end += size * field.count
+        end += struct.calcsize(f"={code}") * field.count
     return layout
 
 

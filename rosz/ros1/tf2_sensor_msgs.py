@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
+from struct import calcsize
 from typing import Any
 
-from rosz.msgs.sensor_msgs.msg import PointCloud2, PointField
+from rosz.msgs.sensor_msgs.msg import PointCloud2
 from rosz.ros1.point_cloud2 import create_cloud, read_points
 from rosz.ros1.tf2_ros import ConvertRegistration, TransformRegistration
-from rosz.transforms import Pose, compose, pose_of, transform_cloud
+from rosz.transforms import FIELD_FORMATS, Pose, compose, pose_of, transform_cloud
 
 __all__ = ("do_transform_cloud",)
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _COORDINATES = 3
-_KINDS = {
-    PointField.INT8: "i1",
-    PointField.UINT8: "u1",
-    PointField.INT16: "i2",
-    PointField.UINT16: "u2",
-    PointField.INT32: "i4",
-    PointField.UINT32: "u4",
-    PointField.FLOAT32: "f4",
-    PointField.FLOAT64: "f8",
-}
-"""The types of numpy by the datatypes of fields."""
 
 
 def do_transform_cloud(cloud: PointCloud2, transform: Any) -> PointCloud2:
@@ -55,9 +45,9 @@ def _packed(cloud: PointCloud2) -> PointCloud2 | None:
         return None
     fields = sorted(cloud.fields, key=lambda field: field.offset)
     names = [field.name for field in fields]
-    kinds = [_KINDS.get(field.datatype, "") for field in fields]
-    floats = all(kind.startswith("f") for kind in kinds[:3])
-    ends = [f.offset + int(k[1:] or 0) * f.count for f, k in zip(fields, kinds, strict=True)]
+    kinds = [FIELD_FORMATS.get(field.datatype, "") for field in fields]
+    floats = all(kind in "fd" for kind in kinds[:3])
+    ends = [f.offset + calcsize(f"={k}") * f.count for f, k in zip(fields, kinds, strict=True)]
     apart = all(field.offset >= end for end, field in zip(ends, fields[1:], strict=False))
     shape, strides = (cloud.height, cloud.width), (cloud.row_step, cloud.point_step)
     data = bytes(cloud.data)

@@ -8,6 +8,7 @@ everything below them.
 
 from rosz.transforms.buffer import Buffer
 from rosz.transforms.conversions import (
+    FIELD_FORMATS,
     transform_cloud,
     transform_message,
     transform_point,
@@ -41,6 +42,7 @@ from rosz.transforms.topics import (
 )
 
 __all__ = (
+    "FIELD_FORMATS",
     "IDENTITY",
     "BroadcasterReport",
     "Buffer",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     Array = np.ndarray[Any, np.dtype[Any]]
 
 __all__ = (
+    "FIELD_FORMATS",
     "transform_cloud",
     "transform_message",
     "transform_point",
@@ -28,7 +29,18 @@ __all__ = (
 )
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
-_FLOATS = {PointField.FLOAT32: "f", PointField.FLOAT64: "d"}
+FIELD_FORMATS = {
+    PointField.INT8: "b",
+    PointField.UINT8: "B",
+    PointField.INT16: "h",
+    PointField.UINT16: "H",
+    PointField.INT32: "i",
+    PointField.UINT32: "I",
+    PointField.FLOAT32: "f",
+    PointField.FLOAT64: "d",
+}
+"""The formats of a PointField's datatypes in ``struct`` and numpy, without the order of bytes."""
+_FLOATS = (PointField.FLOAT32, PointField.FLOAT64)
 
 
 def transform_message(message: Any, pose: Pose, header: Header) -> Any:
@@ -132,7 +144,7 @@ def _place(cloud: PointCloud2, name: str) -> tuple[int, str]:
     if field is None or field.datatype not in _FLOATS or field.count > 1:
         got = "none" if field is None else f"datatype {field.datatype}, count {field.count}"
         raise UsageError(f"the cloud has no coordinate '{name}': expected one float, got {got}")
-    code = _FLOATS[field.datatype]
+    code = FIELD_FORMATS[field.datatype]
     if field.offset + struct.calcsize(f"={code}") > cloud.point_step:
         raise UsageError(f"the coordinate '{name}' ends after point_step {cloud.point_step}")
     return field.offset, (">" if cloud.is_bigendian else "<") + code

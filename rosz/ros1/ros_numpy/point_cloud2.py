@@ -9,6 +9,7 @@ import numpy as np
 
 from rosz.msgs.sensor_msgs.msg import PointCloud2, PointField
 from rosz.ros1.ros_numpy.registry import converts_from_numpy, converts_to_numpy
+from rosz.transforms import FIELD_FORMATS
 
 __all__ = (
     "DUMMY_FIELD_PREFIX",
@@ -30,14 +31,7 @@ DUMMY_FIELD_PREFIX = "__"
 """Prefix of the names of bytes that belong to no field."""
 
 type_mappings: list[tuple[int, np.dtype[Any]]] = [
-    (PointField.INT8, np.dtype("int8")),
-    (PointField.UINT8, np.dtype("uint8")),
-    (PointField.INT16, np.dtype("int16")),
-    (PointField.UINT16, np.dtype("uint16")),
-    (PointField.INT32, np.dtype("int32")),
-    (PointField.UINT32, np.dtype("uint32")),
-    (PointField.FLOAT32, np.dtype("float32")),
-    (PointField.FLOAT64, np.dtype("float64")),
+    (number, np.dtype(kind)) for number, kind in FIELD_FORMATS.items()
 ]
 pftype_to_nptype = dict(type_mappings)
 nptype_to_pftype = {kind: number for number, kind in type_mappings}

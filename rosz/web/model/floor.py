@@ -8,6 +8,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from rosz.names import namespace, short_type
+from rosz.transforms import to_rpy
 from rosz.web.model.permission import Permission
 
 if TYPE_CHECKING:
@@ -155,9 +156,9 @@ class FloorPlan:
     def _move(self, message: Any) -> None:
         place = message.pose.pose.position
         turn = message.pose.pose.orientation
-        theta = math.atan2(2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y**2 + turn.z**2))
+        _, _, yaw = to_rpy((turn.x, turn.y, turn.z, turn.w))
         with self._lock:
-            self._seen.move(place.x, place.y, theta)
+            self._seen.move(place.x, place.y, yaw)
 
     def _see(self, message: Any) -> None:
         with self._lock:

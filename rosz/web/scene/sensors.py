@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from rosz.errors import UsageError
-from rosz.msgs.sensor_msgs.msg import PointField
-from rosz.transforms import Pose
+from rosz.transforms import FIELD_FORMATS, Pose
 from rosz.web.scene.colors import BY_HEIGHT, BY_INTENSITY, OWN, color_bytes, rainbow
 from rosz.web.scene.drawing import Array, Drawing, moved, placed
 from rosz.web.scene.setup import Look
@@ -19,16 +18,6 @@ __all__ = ("MOST_POINTS", "draw_cloud", "draw_old_cloud", "draw_range", "draw_sc
 MOST_POINTS = 500_000
 """Points of a cloud that are drawn; of more, every second one, or every third."""
 _PIXELS = 3.0
-_FORMATS = {
-    PointField.INT8: "i1",
-    PointField.UINT8: "u1",
-    PointField.INT16: "i2",
-    PointField.UINT16: "u2",
-    PointField.INT32: "i4",
-    PointField.UINT32: "u4",
-    PointField.FLOAT32: "f4",
-    PointField.FLOAT64: "f8",
-}
 
 
 def draw_scan(scan: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
@@ -69,12 +58,12 @@ def draw_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
 def _rows(cloud: Any) -> Array:
     """Return the points of a cloud as an array of its fields."""
     order = ">" if cloud.is_bigendian else "<"
-    fields = [one for one in cloud.fields if one.datatype in _FORMATS]
+    fields = [one for one in cloud.fields if one.datatype in FIELD_FORMATS]
     try:
         kind = np.dtype(
             {
                 "names": [one.name for one in fields],
-                "formats": [order + _FORMATS[one.datatype] for one in fields],
+                "formats": [order + FIELD_FORMATS[one.datatype] for one in fields],
                 "offsets": [one.offset for one in fields],
                 "itemsize": cloud.point_step,
             }
