@@ -25,6 +25,9 @@ __all__ = (
     "read_points_list",
 )
 
+_DATATYPES = {kind: (code, struct.calcsize(f"={code}")) for kind, code in FIELD_FORMATS.items()}
+"""Format and size in bytes of a field's value; scripts use this name of ROS 1 too."""
+
 
 def read_points(
     cloud: PointCloud2,
@@ -128,12 +131,12 @@ def _get_struct_fmt(
         if end < field.offset:
             layout += f"{field.offset - end}x"
             end = field.offset
-        code = FIELD_FORMATS.get(field.datatype)
-        if code is None:
+        if field.datatype not in _DATATYPES:
             sys.stderr.write(f"field '{field.name}' has no known datatype: {field.datatype}\n")
             continue
+        code, size = _DATATYPES[field.datatype]
         layout += code * field.count
-        end += struct.calcsize(f"={code}") * field.count
+        end += size * field.count
     return layout
 
 
