@@ -100,7 +100,7 @@ def send_command(
     """
     seconds("--timeout", timeout)
     import rosz.message.convert  # noqa: F401  # used later; Ctrl-C must not interrupt an import
-    from rosz.introspect.actions import action_type, find_action, make_goal, wait_for_action
+    from rosz.introspect.actions import action_type, make_goal, view_of_action, wait_for_action
     from rosz.introspect.arguments import read_arguments
     from rosz.node import Node
     from rosz.node.goals import GoalState
@@ -110,10 +110,7 @@ def send_command(
     with until_stopped() as ready, call.context(lasting=True) as context:
         ready()
         name = call.resolve(action)
-        if wait:
-            wait_for_action(context, name, timeout)
-        view = context.graph.refresh()
-        find_action(view, name)
+        view = wait_for_action(context, name, timeout) if wait else view_of_action(context, name)
         with Node("rosz_action", anonymous=True, context=context) as node:
             kind = action_type(node, view, name)
             with node.action_client(name, kind) as client:

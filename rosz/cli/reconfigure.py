@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
@@ -23,6 +24,7 @@ from rosz.cli.declare import Argument, Json, Option, at_least, seconds, values_l
 from rosz.errors import NotFoundError, WaitTimeout, near_miss
 
 if TYPE_CHECKING:
+    from rosz.graph import View
     from rosz.reconfigure import Client, Config, Description, Group, Setting
 
 __all__ = ("app",)
@@ -228,7 +230,7 @@ def _client(
     if timeout is not None:
         seconds("--timeout", timeout)
     from rosz.node import Node
-    from rosz.reconfigure import Client, find_servers
+    from rosz.reconfigure import Client
 
     full = call.resolve(name, _TOOL)
     with (
@@ -239,11 +241,22 @@ def _client(
         if wait or timeout is not None:
             _wait_for(client, _FOR_EVER if wait else timeout or _TIMEOUT)
         else:
-            known = find_servers(ros.graph.refresh())
-            if client.name not in known:
-                hint = near_miss(client.name, known) or "; 'rosz reconfigure list' lists them"
-                raise NotFoundError(f"no node has settings under '{client.name}'{hint}")
+            ros.graph.find(partial(_check_served, client.name))
         yield client
+
+
+def _check_served(name: str, view: View) -> None:
+    """Check that a node has settings.
+
+    Raises:
+        NotFoundError: It has none, or does not exist.
+    """
+    from rosz.reconfigure import find_servers
+
+    known = find_servers(view)
+    if name not in known:
+        hint = near_miss(name, known) or "; 'rosz reconfigure list' lists them"
+        raise NotFoundError(f"no node has settings under '{name}'{hint}")
 
 
 def _wait_for(client: Client, seconds: float) -> None:

@@ -162,7 +162,7 @@ def call_command(
         if wait:
             token = wait_for_server(context, name, warn)
         else:
-            token = find_server(context.graph.refresh(), name)
+            token = context.graph.find(lambda view: find_server(view, name))
         stopped = context.session.why_silent(token.zid)
         if stopped:
             warn(f"service [{token.name}] does not answer as long as {stopped}")

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from rosz.errors import WaitTimeout, near_miss
+from rosz.errors import NotFoundError, WaitTimeout, near_miss
 from rosz.graph.followed import Followed, GraphListener, ProcessListener
 from rosz.graph.interests import COMPLETE_BY, Interests
 from rosz.graph.view import View
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ("Graph",)
 
+T = TypeVar("T")
 _HINT_TIMEOUT = 1.0
 
 
@@ -114,6 +116,23 @@ class Graph:
             UsageError: The timeout is not a number.
         """
         return self._interests.query(self._interests.all(), self._all_keys(), timeout)
+
+    def find(self, look: Callable[[View], T]) -> T:
+        """Return what a function finds in the graph, for callers that look for a name just once.
+
+        It looks at the replies to a query first. On a busy machine these may end before all have
+        replied; then it looks at all that exists.
+
+        Args:
+            look: Function that raises `NotFoundError` if it does not find what it looks for.
+
+        Raises:
+            NotFoundError: It is not there.
+            ClosedError: The session is closed.
+        """
+        with suppress(NotFoundError):
+            return look(self.refresh())
+        return look(self.view())
 
     def listen(self, listener: GraphListener, *, history: bool = True) -> Callable[[], None]:
         """Call a function for every change in the whole domain, in order, on the graph's thread.

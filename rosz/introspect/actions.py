@@ -26,6 +26,7 @@ __all__ = (
     "find_action",
     "list_actions",
     "make_goal",
+    "view_of_action",
     "wait_for_action",
 )
 
@@ -90,8 +91,22 @@ def find_action(view: View, name: str) -> str:
     return view.servers(name + _SUFFIX)[0].type_name.removesuffix(_SERVICE)
 
 
-def wait_for_action(context: Context, name: str, timeout: float) -> str:
-    """Return the type of an action, and wait while nobody serves it.
+def view_of_action(context: Context, name: str) -> View:
+    """Return a view of the graph that has the server of an action.
+
+    Raises:
+        NotFoundError: No node serves it.
+    """
+
+    def look(view: View) -> View:
+        find_action(view, name)
+        return view
+
+    return context.graph.find(look)
+
+
+def wait_for_action(context: Context, name: str, timeout: float) -> View:
+    """Return a view of the graph that has the server of an action, and wait while there is none.
 
     Args:
         context: The context whose graph is watched.
@@ -102,10 +117,9 @@ def wait_for_action(context: Context, name: str, timeout: float) -> str:
         WaitTimeout: No node served it in time.
         ClosedError: The context is shut down meanwhile.
     """
-    view = context.graph.wait_for(
+    return context.graph.wait_for(
         lambda view: bool(view.servers(name + _SUFFIX)), timeout, f"server of action '{name}'"
     )
-    return find_action(view, name)
 
 
 def action_type(node: Node, view: View, name: str) -> type[Action]:

@@ -86,9 +86,8 @@ def wait_for_server(context: Context, name: str, warn: Callable[[str], object]) 
     Raises:
         ClosedError: The context is shut down meanwhile.
     """
-    view = context.graph.refresh()
     try:
-        return find_server(view, name)
+        return context.graph.find(lambda view: find_server(view, name))
     except NotFoundError as error:
         warn(f"service [{name}] is not there yet ({error})")
     return find_server(context.graph.wait_for_service(name, threading.TIMEOUT_MAX / 2), name)

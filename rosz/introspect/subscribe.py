@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosz import names
@@ -77,10 +76,8 @@ def wait_for_target(
         target = find_target(name, topic_types(view), load)
         return target, find_token(view, target.topic, target.type_name)
 
-    with suppress(NotFoundError):
-        return find(context.graph.refresh())
-    try:  # on a busy machine, the query may have ended before all have replied
-        return find(context.graph.view())
+    try:
+        return context.graph.find(find)
     except NotFoundError as error:
         warn(f"topic [{name}] does not appear to be published yet ({error})")
     found: list[tuple[Target, Token]] = []
