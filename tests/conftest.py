@@ -16,9 +16,11 @@ from pathlib import Path
 import oracle
 import pytest
 from hypothesis import HealthCheck, settings
-from network import Network
+from network import TIMEOUT, Network
 
 from rosz.message import Ros2Default
+from rosz.node import Client, Publisher, Subscription
+from rosz.node.action_client import ActionClient
 
 # Tests give the same result on a busy machine. ROSZ_EXAMPLES=20000 takes a night.
 settings.register_profile(
@@ -56,8 +58,6 @@ def pytest_configure() -> None:
 
 _HOSTS = Path(__file__).parent / "hosts"
 _SYSTEM = {"course", "faults", "hosts", "interop"}
-_MANY_PROCESSES = {"hosts", "security"}
-"""Folders of tests that take over 15 s, and several times that on a busy machine."""
 _ROS_1 = {"genpy", "ros", "ros1", "roslaunch"}
 """Fixtures that start real ROS 1."""
 
@@ -73,13 +73,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.system)
         if fixtures & _ROS_1:
             item.add_marker(pytest.mark.ros1)
-        if folder in _MANY_PROCESSES and item.get_closest_marker("timeout") is None:
-            item.add_marker(pytest.mark.timeout(240))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Refuse ROS 1 to tests that lack the mark."""
     oracle.marked = item.get_closest_marker("ros1") is not None
+
+
+@pytest.fixture(autouse=True)
+def patient_waits(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Waits for others last as long as `TIMEOUT`; the defaults are for a machine that is not busy.
+
+    Tests that open no session see the defaults as they are.
+    """
+    if request.node.get_closest_marker("system") is not None:
+        for wait in (Client.wait_for_service, ActionClient.wait_for_server, Subscription.get):
+            monkeypatch.setattr(wait, "__defaults__", (TIMEOUT,))
+        monkeypatch.setattr(Publisher.wait_for_subscribers, "__defaults__", (1, TIMEOUT))
 
 
 @pytest.fixture

@@ -26,8 +26,9 @@ from rosz.session import Session, SessionConfig
 
 __all__ = ("TIMEOUT", "WHOLE_LINES", "Network", "Program", "eventually", "free_port", "repeats")
 
-TIMEOUT = 15.0
-"""Seconds after which something that should happen at once counts as never happening."""
+TIMEOUT = 60.0
+"""Seconds after which something that should happen at once counts as never happening: a machine
+that runs a hundred other programs may take a minute to start one."""
 
 T = TypeVar("T", bound="Any")
 _ROOT = Path(__file__).parent.parent

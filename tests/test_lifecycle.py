@@ -11,12 +11,11 @@ import threading
 from collections.abc import Callable
 
 import pytest
+from network import TIMEOUT
 
 from rosz import lifecycle
 from rosz.errors import ClosedError
 from rosz.lifecycle import Lifecycle, Registration
-
-TIMEOUT = 10.0
 
 
 def part(name: str, done: list[str]) -> Registration:

@@ -10,7 +10,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.actions import (
     ActionClient,
@@ -24,8 +24,6 @@ from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.std_msgs.msg import String
 from rosz.packages import PackageIndex
 from rosz.typestore import TypeStore
-
-TIMEOUT = 15.0
 
 
 class Count:

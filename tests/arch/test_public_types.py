@@ -24,7 +24,6 @@ def is_public(name: str) -> bool:
     return inside or "." not in rest
 
 
-@pytest.mark.timeout(240)
 def test_public_names_are_fully_typed() -> None:
     pytest.importorskip("basedpyright", reason="needs basedpyright, of the extra 'test'")
     done = subprocess.run(

@@ -274,7 +274,6 @@ def plot(bag: str, *words: str) -> int:
     return run(["bag", "plot", bag, *words])
 
 
-@pytest.mark.timeout(300)  # matplotlib's first picture reads all fonts of the machine
 def test_plots_are_drawn(bag: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["/point/point/x:y", "/scan/ranges[0],/a/b/data", "-o"]
     for suffix, begin in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):

@@ -65,7 +65,6 @@ def test_nodes_find_a_core_that_started_afresh(shell: Shell) -> None:
     assert node.params.get("/x") == 2
 
 
-@pytest.mark.timeout(120)
 def test_a_core_that_is_linked_but_lacks_tokens_starts_afresh(shell: Shell) -> None:
     """Rules of Zenoh that take no tokens stand for links that it confuses."""
     deaf = {

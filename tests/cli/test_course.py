@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from network import Network
 
 from .test_env import evaluate
@@ -10,7 +9,6 @@ from .test_env import evaluate
 UNTIL = "timeout 30 sh -c 'until {} 2>/dev/null | grep -q {}; do :; done'"
 
 
-@pytest.mark.timeout(120)
 def test_turtles_and_parameters(network: Network) -> None:
     done = evaluate(
         network,

@@ -53,7 +53,6 @@ def fleet(folder: Path, script: str, count: int) -> str:
     return str(file)
 
 
-@pytest.mark.timeout(180)
 def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
     count = repeats(26, 100)  # more than form a mesh
     run = launch(fleet(network.folder, TALKER, count))

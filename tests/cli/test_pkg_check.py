@@ -44,7 +44,6 @@ def test_no_workspace(tmp_path: Path) -> None:
     assert "no package in the workspace around" in done.stderr
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_the_steps_of_a_course(network: Network, shell: str) -> None:
     done = evaluate(

@@ -52,7 +52,6 @@ def open_folder() -> Iterator[Path]:
 
 
 @pytest.mark.system
-@pytest.mark.timeout(300)
 def test_nodes_start_register_and_end_as_on_rospy(corpus: Corpus, open_folder: Path) -> None:
     modules = ("rospy", "tf", "actionlib", "diagnostic_updater", "message_filters", "catkin_pkg")
     require(*modules, package="python3-rospy, python3-tf, python3-diagnostic-updater, catkin …")

@@ -12,7 +12,7 @@ from network import free_port
 from .terminal import COURSE, Desk, without_times
 from .test_names_lab import counts, is_run
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
 
 _SLOW = 60.0
 

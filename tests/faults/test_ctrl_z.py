@@ -236,7 +236,6 @@ def test_the_only_other_one_is_stopped(network: Network) -> None:
     assert output.split() == ["/a", "/m", "/n"]
 
 
-@pytest.mark.timeout(180)
 def test_one_that_opens_slowly_is_met_soon(network: Network) -> None:
     """On a busy machine it listens long after the other one has found out that it will."""
     victim = old(network, "a")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import pytest
 from network import Network, Program
 
 from rosz.graph import Graph
@@ -38,7 +37,6 @@ def wait_until_gone(graph: Graph, name: str) -> float:
     return time.monotonic()
 
 
-@pytest.mark.timeout(240)
 def test_each_dies_and_comes_back(network: Network) -> None:
     """Nobody is special: whoever dies, all others go on, and its next life joins them."""
     programs = [start(network, number, 0) for number in range(COUNT)]

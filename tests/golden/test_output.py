@@ -11,7 +11,6 @@ from .world import GoldenWorld
 CASES = ALONE | AMONG_NODES
 
 
-@pytest.mark.timeout(480)
 @pytest.mark.parametrize("name", CASES)
 def test_output(name: str) -> None:
     with GoldenWorld(nodes=name in AMONG_NODES) as world:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import time
 
-import pytest
-
 from hosts.scripts import slack
 from hosts.world import World
 
@@ -42,7 +40,6 @@ with rosz.Node("client") as node:
 """
 
 
-@pytest.mark.timeout(120)
 def test_a_goal_survives_a_cut_link(world: World) -> None:
     """It is followed again after a cut that is longer than links last."""
     robot, laptop = world.hosts("robot", "laptop")

@@ -105,7 +105,6 @@ CUTS = [3, 6, 9, 12, 20, 60] if repeats(0, 1) else [10]
 
 @pytest.mark.parametrize("linked", ["core", "nodes"])
 @pytest.mark.parametrize("seconds", CUTS)
-@pytest.mark.timeout(180)
 def test_a_link_is_cut_and_healed(world: World, linked: str, seconds: float) -> None:
     pair = Pair(world, linked)
     began = time.monotonic()
@@ -129,7 +128,6 @@ def test_a_link_is_cut_and_healed(world: World, linked: str, seconds: float) -> 
 
 
 @pytest.mark.parametrize("linked", ["core", "nodes"])
-@pytest.mark.timeout(120)
 def test_a_link_that_was_just_given_up_holds_up_nothing(world: World, linked: str) -> None:
     """Its connection has things to send still, which is no reason to wait for it."""
     pair = Pair(world, linked)
@@ -145,7 +143,6 @@ def test_a_link_that_was_just_given_up_holds_up_nothing(world: World, linked: st
     assert max(seconds) < 3 * slack()
 
 
-@pytest.mark.timeout(120)
 def test_a_bad_link(world: World) -> None:
     if not Path("/dev/net/tun").exists():
         pytest.skip("bad links need /dev/net/tun")
@@ -240,7 +237,6 @@ def counted(ear: HostProgram) -> int:
 
 
 @pytest.mark.parametrize("where", ["same machine", "other machine"])
-@pytest.mark.timeout(120)
 def test_a_subscriber_stops_while_a_publisher_runs(world: World, where: str) -> None:
     robot, laptop = world.hosts("robot", "laptop")
     start_core(robot, "--listen", LISTEN)

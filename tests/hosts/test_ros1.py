@@ -23,7 +23,6 @@ from hosts.world import World
 pytestmark = [
     pytest.mark.ros1,
     pytest.mark.skipif(not is_installed("rospy", "rosmaster"), reason="needs ros-base of Debian"),
-    pytest.mark.timeout(240),
 ]
 
 _MASTER = "http://127.0.0.1:11311"

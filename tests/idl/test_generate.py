@@ -122,7 +122,6 @@ EXPECTED = [
 ]
 
 
-@pytest.mark.timeout(300)
 def test_generated_modules_satisfy_mypy(tmp_path: Path) -> None:
     package(
         tmp_path / "src",

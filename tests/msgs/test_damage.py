@@ -78,7 +78,6 @@ def test_a_value_or_a_decode_error(shard: int) -> None:
     assert count / 20 < refused < count
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("seed", range(25))
 def test_invented_types(seed: int) -> None:
     """The shipped types have hardly any bounds and no wide strings."""

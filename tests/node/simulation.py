@@ -6,12 +6,13 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from network import TIMEOUT
+
 from rosz.errors import RoszError
 from rosz.node.clock import Clock
 
 SECOND = 1_000_000_000
 START = 100 * SECOND
-TIMEOUT = 20.0
 
 
 class Beds(set[Any]):

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from simulation import SECOND, START, TIMEOUT, Beds, SimulatedClock, Task
+from network import TIMEOUT
+from simulation import SECOND, START, Beds, SimulatedClock, Task
 
 from rosz.errors import TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock, TimeJump

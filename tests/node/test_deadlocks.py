@@ -17,7 +17,7 @@ from rosz.msgs.example_interfaces.srv import AddTwoInts, AddTwoIntsRequest
 from rosz.msgs.std_msgs.msg import Int32
 from rosz.node import Node
 
-WATCHDOG = 10.0
+WATCHDOG = TIMEOUT
 ROUNDS = repeats(4, 50)
 
 PARTNER = """

@@ -57,7 +57,6 @@ EVERYTHING = """
 """
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("company", [False, True], ids=["alone", "in company"])
 def test_a_program_that_closes_nothing_ends_at_once(network: Network, company: bool) -> None:
     if company:
@@ -72,7 +71,6 @@ def test_a_program_that_closes_nothing_ends_at_once(network: Network, company: b
         program.close()
 
 
-@pytest.mark.timeout(600)
 def test_an_exception_ends_it_too(network: Network) -> None:
     program = network.program(
         """

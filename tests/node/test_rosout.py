@@ -6,7 +6,8 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from simulation import START, TIMEOUT, SimulatedClock
+from network import TIMEOUT
+from simulation import START, SimulatedClock
 
 from rosz.errors import ClosedError
 from rosz.node import log_handlers

@@ -6,7 +6,8 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from simulation import SECOND, START, TIMEOUT, SimulatedClock
+from network import TIMEOUT
+from simulation import SECOND, START, SimulatedClock
 
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
 from rosz.node.clock import Clock

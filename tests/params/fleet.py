@@ -13,10 +13,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from network import Program, eventually, free_port
+from network import TIMEOUT, Program, eventually, free_port
 
 ROOT = Path(__file__).parents[2]
-TIMEOUT = 50.0
 
 
 class Process(Program):

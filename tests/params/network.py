@@ -6,14 +6,13 @@ import threading
 from typing import Any
 
 import network
+from network import TIMEOUT
 
 from rosz.lifecycle import Closable
 from rosz.params import condense, normalise, spread
 from rosz.params.remote import ParamClient
 from rosz.params.replica import Outcome, Replica
 from rosz.session import MeshReadiness, Session, SessionConfig, serve_links
-
-TIMEOUT = 10.0
 
 
 def merge(store: Replica | ParamClient, name: str, value: Any, **how: Any) -> Outcome:

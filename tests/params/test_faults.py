@@ -25,8 +25,6 @@ STOPPED = 10.0 if FULL else 3.5
 LOADED = 5_000
 MANY = 200 if FULL else 40
 
-pytestmark = pytest.mark.timeout(300)
-
 
 @pytest.fixture
 def fleet() -> Iterator[Fleet]:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Collection
 
 import pytest
-from network import eventually
+from network import TIMEOUT, eventually
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
 from rosz.params.replica import Replica
@@ -24,7 +24,7 @@ from rosz.params.wire import (
 )
 from rosz.session import HybridClock, Stamp
 
-from .network import TIMEOUT, Network, merge
+from .network import Network, merge
 
 
 class SkewedClock(HybridClock):

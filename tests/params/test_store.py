@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given
-from network import eventually
+from network import TIMEOUT, eventually
 
 from rosz.errors import ParamError, StoreError
 from rosz.params.history import History
 from rosz.params.replica.storage import Storage, StoreFile
 from rosz.params.writes import DELETED, Change, Write, put
 
-from .network import TIMEOUT, Network
+from .network import Network
 from .strategies import writes
 from .test_replica import Mute
 

@@ -7,14 +7,13 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
+from network import TIMEOUT
 
 from rosz.params.replica import Changed
 from rosz.params.replica.watch import TreeChange, Watchers, is_same
 from rosz.params.writes import Write, put
 
 from .network import Network, merge
-
-TIMEOUT = 10
 
 
 def told(queue: SimpleQueue[Changed], count: int) -> list[tuple[str, Any, Any]]:

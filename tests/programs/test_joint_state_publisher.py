@@ -66,7 +66,6 @@ def both(side: RealSide | RoszSide, folder: Path) -> list[str]:
     return run_script(side, folder, USER, PROGRAM)
 
 
-@pytest.mark.timeout(120)
 def test_it_publishes_what_that_of_ros_1_does(ros: Ros, network: Network, tmp_path: Path) -> None:
     if not Path("/usr/lib/joint_state_publisher").exists():
         pytest.skip("needs that of ROS 1 (Debian: joint-state-publisher)")

@@ -274,7 +274,6 @@ COMMANDS = (
 )
 
 
-@pytest.mark.timeout(120)
 def test_the_programs_do_what_those_of_ros_1_do(ros: Ros, network: Network, tmp_path: Path) -> None:
     if not Path("/usr/lib/topic_tools/mux").exists():
         pytest.skip("needs topic_tools of ROS 1 (Debian: topic-tools, python3-topic-tools)")

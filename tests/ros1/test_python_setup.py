@@ -16,8 +16,6 @@ from rosz.packages import PackageIndex
 from rosz.ros1.python_setup import Offers
 from rosz.ros1.setup_reader import read_setup
 
-pytestmark = pytest.mark.timeout(400)  # catkin_make may take long
-
 TOP = Path(__file__).parents[2]
 
 CATKIN = "from catkin_pkg.python_setup import generate_distutils_setup\n"

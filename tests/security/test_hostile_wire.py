@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
-import pytest
 from interop.plain import Plain, plain_session
 from network import Network, Program
 
@@ -145,7 +144,6 @@ def memory(victim: Program) -> int:
     return int(megabytes)
 
 
-@pytest.mark.timeout(300)
 def test_only_damaged_data(network: Network) -> None:
     victim = network.program(VICTIM)
     _, zid, node_id = victim.wait_for("up").split()

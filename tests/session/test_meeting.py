@@ -29,7 +29,6 @@ PEER = """
 """
 
 
-@pytest.mark.timeout(600)
 def test_two_at_the_same_moment(network: Network) -> None:
     for _ in range(repeats(15, 300)):
         network.rendezvous = f"tcp/127.0.0.1:{free_port()}"

@@ -16,7 +16,7 @@ from rosz.web.pages.layout import ENTRIES
 
 from .robot import LONG, ROBOT, THEMES, World, open_browser, set_screen, take_picture
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.system]
 
 
 @pytest.fixture(scope="module")

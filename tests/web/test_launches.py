@@ -16,7 +16,7 @@ from rosz.web.model import Launches, NodeOutput, Permission, RunningLaunch
 
 from .robot import LONG, World, open_browser, set_screen, take_picture
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.system]
 
 _LOUD = """
 echo begun; test -e {go} && {{ echo again; exec sleep 600; }}

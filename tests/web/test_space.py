@@ -10,7 +10,7 @@ from network import Network, eventually
 
 from .robot import LONG, SPACE, THEMES, World, open_browser, set_screen, take_picture
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.system]
 
 _SHOW = "show=grid,tf,robot,/map,/cloud,/scan;color=%23ff3030,/markers,/path;color=%231f9d61"
 _DRAWN = """

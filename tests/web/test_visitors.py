@@ -15,7 +15,7 @@ from rosz.msgs.std_srvs.srv import Empty
 
 from .visitor import Visitor
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.system]
 LONG = 4 * TIMEOUT
 
 

@@ -112,7 +112,6 @@ def test_every_window_is_a_program_of_a_package() -> None:
 
 
 @pytest.mark.system
-@pytest.mark.timeout(240)
 def test_windows_open_where_a_page_is_served(network: Network) -> None:
     alone = network.run(
         "-m", "rosz", "run", "rqt_graph", "rqt_graph", DISPLAY="", WAYLAND_DISPLAY=""

@@ -20,7 +20,7 @@ from rosz.node import Node, simulate
 
 from .bridge import bridge_on, package_in
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.system]
 
 _PACKAGES = (
     "@foxglove/ws-protocol@0.8",

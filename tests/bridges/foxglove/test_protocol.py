@@ -511,7 +511,6 @@ def test_a_file_that_is_too_large(network: Network) -> None:
         assert b"larger than 64 MB" in frame
 
 
-@pytest.mark.timeout(120)
 def test_the_launch_file(network: Network) -> None:
     secret = network.folder / "password"
     secret.write_text("secret\n")

@@ -22,7 +22,7 @@ from cli.side_by_side.worlds import Outcome, Ros1, World
 from network import eventually, repeats
 from oracle import PYTHON
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
 
 _ROOT = Path(__file__).parents[3]
 _NODES = _ROOT / "tests" / "cli" / "side_by_side" / "nodes.py"

@@ -13,7 +13,7 @@ from network import TIMEOUT, Network, Program, eventually
 from rosz.bridges.ros1 import MasterBridge
 from rosz.msgs.std_msgs.msg import String
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
 
 _PACKAGES = ("@foxglove/ros1@3", "tslib@2")  # the first needs the other, and does not say so
 _INSTALL_SECONDS = 100

@@ -21,7 +21,7 @@ from rosz.msgs.std_msgs.msg import String
 
 from .world import LISTENER, roscpp
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
 
 _LAUNCH = """<launch>
   <machine name="here" address="localhost"/>

@@ -26,7 +26,7 @@ from rosz.session.session import Session
 
 from .world import World
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
 
 NAME = "/restarted"
 _OTHERS = 8

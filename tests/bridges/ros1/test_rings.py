@@ -16,7 +16,7 @@ from rosz.bridges.ros1 import AttachedBridge, MasterBridge
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Node
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.system]
 
 
 class Place:

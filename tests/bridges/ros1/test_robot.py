@@ -32,7 +32,7 @@ from rosz.transforms import (
 
 from .world import World, roscpp
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
 
 SERVER = """
     import rosz.ros1

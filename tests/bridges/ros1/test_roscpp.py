@@ -17,7 +17,7 @@ from rosz.node import Node
 
 from .world import World, roscpp
 
-pytestmark = [pytest.mark.ros1, pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros1, pytest.mark.system]
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,6 @@ from .world import World
 pytestmark = [
     pytest.mark.ros1,
     pytest.mark.system,
-    pytest.mark.timeout(240),
     pytest.mark.skipif(
         not (shutil.which("rviz") and shutil.which("xvfb-run")),
         reason="needs rviz and xvfb-run (Debian: rviz, xvfb)",

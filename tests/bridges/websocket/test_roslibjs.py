@@ -26,7 +26,7 @@ from rosz.transforms import StaticTransformBroadcaster
 
 from .bridge import Doubling, bridge_on
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.system]
 
 SCRIPT = """
 import * as ROSLIB from "roslib";

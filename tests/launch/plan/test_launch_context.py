@@ -86,7 +86,6 @@ READING = [
 ]
 
 
-@pytest.mark.timeout(20)
 @pytest.mark.parametrize("text", READING)
 @pytest.mark.parametrize("name", ["pipe", "/dev/zero"])
 def test_files_that_are_not_regular_are_refused(tmp_path: Path, text: str, name: str) -> None:

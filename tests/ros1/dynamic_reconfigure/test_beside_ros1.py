@@ -20,7 +20,7 @@ from oracle import PYTHON, require
 
 from .cfg_samples import write_package
 
-pytestmark = [pytest.mark.ros1, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.ros1]
 
 PROGRAMS = Path(__file__).with_name("programs")
 _PROGRAM_SAYS = re.compile(r"\[\(|/|serving|end")

@@ -20,7 +20,6 @@ def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros]:
     runner.close()
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
 def test_programs_behave_the_same(
     ros: Ros, network: Network, tmp_path: Path, scenario: Scenario
