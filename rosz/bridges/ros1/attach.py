@@ -103,6 +103,8 @@ class AttachedBridge:
         self._lifecycle.keep(Registration(shared.close))
         self._worker: Worker[Callable[[], object]] = Worker("rosz-ros1-master", logger=log)
         self._entries: set[Entry] = set()
+        self._uris: dict[str, str] = {}
+        self._ended: set[tuple[str, str]] = set()
         self._run_id: object = _UNKNOWN
         self._reported = ""
         self._active = False
@@ -135,6 +137,10 @@ class AttachedBridge:
         server.start(
             lambda call, stream: api.answer("", call, stream),
             self._mirror.accept,
+        )
+        shared.prober.start(
+            lambda: self._uris,
+            lambda *found: self._worker.submit(partial(self._on_probe, *found)),
         )
         self._worker.submit(self._poll)
 
@@ -197,6 +203,7 @@ class AttachedBridge:
         self._check_master()
         self._active = self._is_first()
         if not self._active:
+            self._uris = {}
             self._apply(set())
             return
         self._apply(self._read(nodes, kinds))
@@ -258,17 +265,20 @@ class AttachedBridge:
         )
         of_node = dict(zip(nodes, uris, strict=False))
         of_service = dict(zip(services, uris[len(nodes) :], strict=False))
+        self._uris = {node: self._reachable(uri) for node, uri in of_node.items() if uri}
+        self._ended &= self._uris.items()
         return {
             Entry(
                 role,
                 name,
                 node,
-                self._reachable(of_node[node]),
+                self._uris[node],
                 types.get(name, "*") if role != "service" else "",
                 self._reachable(of_service[name]) if role == "service" else "",
             )
             for role, name, node in found
-            if of_node[node] and (role != "service" or of_service[name])
+            if node in self._uris and (role != "service" or of_service[name])
+            if (node, self._uris[node]) not in self._ended
         }
 
     def _reachable(self, uri: str) -> str:
@@ -279,6 +289,12 @@ class AttachedBridge:
         except (OSError, UnicodeError):
             return uri.replace(f"//{address.host}:", f"//{self._address.host}:")
         return uri
+
+    def _on_probe(self, node: str, uri: str, is_there: bool) -> None:
+        """Take a node from the network that has ended: the master keeps its registrations."""
+        if is_there == ((node, uri) in self._ended):
+            (self._ended.discard if is_there else self._ended.add)((node, uri))
+            self._look()
 
     def _apply(self, entries: set[Entry]) -> None:
         gone, new = self._entries - entries, entries - self._entries

@@ -15,7 +15,7 @@ import msgspec
 from rosz.bridges.ros1.master import Master
 from rosz.bridges.ros1.mirror import Mirror
 from rosz.bridges.ros1.node_api import NodeApi
-from rosz.bridges.ros1.peers import call, is_listening
+from rosz.bridges.ros1.peers import call
 from rosz.bridges.ros1.registry import Change, Entry
 from rosz.bridges.ros1.server import Server
 from rosz.bridges.ros1.shared import MASTER, MASTER_NODE, Shared
@@ -30,7 +30,6 @@ __all__ = ("MASTER_PORT", "MasterBridge", "open_master", "running_master")
 MASTER_PORT = 11311
 """Port of ROS 1's master, unless ``ROS_MASTER_URI`` names another one."""
 
-_PROBE_SECONDS = 3.0
 _PROBE_TIMEOUT = 2.0
 
 
@@ -109,10 +108,9 @@ class MasterBridge:
         self._lifecycle.keep(self._mirror)
         self._file = environment.home / "rosz" / f"ros1_master_{self.port}.json"
         self._saving = False
-        self._checking: set[str] = set()
         server.start(self._master.dispatch, self._mirror.accept)
         self._restore()
-        shared.changes.later(_PROBE_SECONDS, self._probe)
+        shared.prober.start(self._master.nodes, self._on_probe)
 
     def nodes(self) -> dict[str, str]:
         """Return the URIs of the nodes that are registered, by name."""
@@ -134,22 +132,9 @@ class MasterBridge:
             self._saving = True
             self._shared.changes.submit(self._save)
 
-    # Nodes that have ended.
-
-    def _probe(self) -> None:
-        """Look whether the nodes are still there."""
-        for node, uri in self._master.nodes().items():
-            if node not in self._checking:
-                self._checking.add(node)
-                self._shared.requests.submit(partial(self._check, node, uri))
-        self._shared.changes.later(_PROBE_SECONDS, self._probe)
-
-    def _check(self, node: str, uri: str) -> None:
-        try:
-            if not is_listening(uri, _PROBE_TIMEOUT) and self._master.drop(node, uri):
-                log.info("node '%s' of ROS 1 has ended", node)
-        finally:
-            self._checking.discard(node)
+    def _on_probe(self, node: str, uri: str, is_there: bool) -> None:
+        if not is_there and self._master.drop(node, uri):
+            log.info("node '%s' of ROS 1 has ended", node)
 
     # Registrations outlive the master.
 

@@ -167,6 +167,7 @@ class ProvidedService:
                 finally:
                     self._sockets.discard(sock)
         except (OSError, RoszError) as error:
+            self._shared.prober.check(self.entry.node, self.entry.uri)
             raise ServiceError(f"node '{self.entry.node}' of ROS 1: {error}") from error
         if ok != _OK:
             raise ServiceError(data.decode(errors="replace").removeprefix(_REFUSED))

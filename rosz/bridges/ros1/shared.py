@@ -8,6 +8,7 @@ import msgspec
 
 from rosz.bridges.logs import GATHERED, LOGS
 from rosz.bridges.ros1.codec import Codecs
+from rosz.bridges.ros1.prober import Prober
 from rosz.bridges.ros1.rosout import log_tokens
 from rosz.bridges.ros1.sockets import SocketLoop, log
 from rosz.lifecycle import Lifecycle
@@ -68,6 +69,7 @@ class Shared:
         loop: The thread that reads from sockets.
         requests: Threads for what waits for other programs.
         changes: One thread, on which all declarations on the network come and go.
+        prober: What looks whether nodes of ROS 1 are still there.
         gids: Ids of the publishers of this bridge.
         lifecycle: The lifecycle of the bridge.
     """
@@ -84,6 +86,7 @@ class Shared:
             "rosz-ros1-requests", threads=_THREADS, capacity=_MAX_REQUESTS, logger=log
         )
         self.changes: Worker[Callable[[], object]] = Worker("rosz-ros1-changes", logger=log)
+        self.prober = Prober(self.requests, self.changes)
         self.gids: set[bytes] = set()
         self.lifecycle = Lifecycle("the bridge to ROS 1", log=log)
         self._log_tokens: tuple[Token, ...] = log_tokens(context) if is_master else ()

@@ -290,6 +290,7 @@ class PublishedTopic:
     def _lost(self) -> None:
         if self._stream is not None and self._stream.is_closed:
             self._stream = None
+            self._shared.prober.check(self.entry.node, self.entry.uri)
             self._retry()
 
 

@@ -11,6 +11,7 @@ import pytest
 from network import TIMEOUT, Network, Program, eventually, free_port
 
 from rosz.bridges.ros1 import AttachedBridge, Choice
+from rosz.errors import WaitTimeout
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node
@@ -117,6 +118,28 @@ def test_names_are_chosen_and_moved(robot: Robot, node: Node) -> None:
     for talker in talkers:
         talker.send(signal.SIGINT)
         talker.exit_code()
+
+
+def test_a_killed_node_goes_from_the_network(robot: Robot, node: Node) -> None:
+    """The master itself never forgets it."""
+    view = node.context.graph.view
+    with robot.join():
+        for _ in range(2):
+            server = robot.rospy(SERVER)
+            server.wait_for("ready")
+            eventually(lambda: view().servers("/of_rospy"))
+            server.send(signal.SIGSTOP)
+            with (
+                node.client("/of_rospy", SetBool, timeout=0.2) as client,
+                pytest.raises(WaitTimeout),
+            ):
+                client(True)
+            server.send(signal.SIGCONT)
+            with node.client("/of_rospy", SetBool, timeout=TIMEOUT) as client:
+                assert client(True).message == "from rospy"
+            server.kill()
+            eventually(lambda: not view().servers("/of_rospy"))
+            assert "/rospy_server" in robot.run("rosnode", "list").split()
 
 
 def test_the_bridge_is_back_after_the_master(robot: Robot, node: Node) -> None:
