@@ -12,12 +12,13 @@ from typing import Any, Protocol
 
 from rosz.bridges.ros1.actions import Actions
 from rosz.bridges.ros1.frames import encode_header
+from rosz.bridges.ros1.published import PublishedTopic
 from rosz.bridges.ros1.registry import ANY_TYPE, Change, Entry, Role
 from rosz.bridges.ros1.server import Incoming
 from rosz.bridges.ros1.services import Clients, ProvidedService, ServiceConnection
-from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, Shared
+from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, Connection, Shared
 from rosz.bridges.ros1.sockets import log
-from rosz.bridges.ros1.topics import Connection, PublishedTopic, SubscribedTopic
+from rosz.bridges.ros1.subscribed import SubscribedTopic
 from rosz.errors import ClosedError, InvalidName, RoszError, ServiceError, UsageError
 from rosz.lifecycle import Registration
 from rosz.node import BridgedNode

@@ -17,7 +17,7 @@ from rosz.node import Context
 from rosz.wire import Kind, Token, format_token, gid
 from rosz.worker import Worker
 
-__all__ = ("BRIDGE", "MASTER", "MASTER_NODE", "Identity", "Shared")
+__all__ = ("BRIDGE", "MASTER", "MASTER_NODE", "QUEUE", "Connection", "Identity", "Shared")
 
 BRIDGE = "/ros1_bridge_"
 """What the names of bridges begin with that join a master of ROS 1.
@@ -32,9 +32,28 @@ MASTER_NODE = "/ros1_master_"
 MASTER = "/master"
 """The name under which a master calls nodes."""
 
+QUEUE = 10
+"""Messages of a topic that wait, where nothing else is known."""
+
 _THREADS = 16
 _MAX_REQUESTS = 10_000
 _MAX_IDENTITIES = 10_000
+
+
+class Connection(msgspec.Struct, frozen=True):
+    """A connection between the bridge and a node of ROS 1 for a topic.
+
+    Attributes:
+        node: Full name of the node.
+        publishes: Whether it is the node that publishes.
+        bytes: Number of bytes that have crossed.
+        messages: Number of messages that have crossed.
+    """
+
+    node: str
+    publishes: bool
+    bytes: int
+    messages: int
 
 
 class Identity(msgspec.Struct):

@@ -18,7 +18,8 @@ import pytest
 from network import TIMEOUT, eventually, repeats
 
 from rosz.bridges.ros1.frames import decode_header, encode_header, frame
-from rosz.bridges.ros1.topics import PublishedTopic, SubscribedTopic
+from rosz.bridges.ros1.published import PublishedTopic
+from rosz.bridges.ros1.subscribed import SubscribedTopic
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node, Publisher, Service, Subscription
