@@ -7,12 +7,15 @@ every few messages. So what else runs on the machine disturbs all of them alike.
 from __future__ import annotations
 
 import json
+import statistics
 from collections.abc import Mapping
 from typing import Protocol
 
 from network import Network, Program, free_port
 
-__all__ = ("CLOUD_BYTES", "Copies", "Listener", "Readers", "Sink", "publishing_times")
+from .figures import OWN, Figure, percentile
+
+__all__ = ("CLOUD_BYTES", "Copies", "Listener", "Readers", "Sink", "publishing_figures")
 
 CLOUD_BYTES = 10_000_000
 TIMEOUT = 180.0
@@ -181,28 +184,40 @@ class Copies(Readers):
         return super().switch_off()
 
 
-def publishing_times(
-    network: Network, sinks: Mapping[str, Sink], rounds: int, rate: float = 5.0, count: int = 10
-) -> tuple[dict[str, list[list[float]]], dict[str, float]]:
-    """Return the times of each round, in seconds, and how many clouds came, by the name of a sink.
+def publishing_figures(
+    name: str, came: Figure, network: Network, sinks: Mapping[str, Sink], rounds: int, count: int
+) -> list[Figure]:
+    """Measure how long the publisher takes, with 5 clouds per second.
 
     Args:
+        name: What receives.
+        came: Figure of the clouds that come to each.
         network: The network.
         sinks: What receives, each in turn.
         rounds: How often.
-        rate: Clouds per second.
         count: Clouds of a round.
+
+    Returns:
+        The median, the 99th percentile, and what came.
     """
-    talker = network.program(TALKER, str(CLOUD_BYTES), str(rate), str(count))
-    times: dict[str, list[list[float]]] = {name: [] for name in sinks}
-    came = dict.fromkeys(sinks, 0.0)
+    asked = {system: "about 1" for system in sinks if system != OWN}
+    middle = Figure(f"{name}: publishing, median", "ms", asked)
+    slow = Figure(f"{name}: publishing, p99", "ms", asked)
+    talker = network.program(TALKER, str(CLOUD_BYTES), "5", str(count))
+    times: dict[str, list[float]] = {system: [] for system in sinks}
+    totals = dict.fromkeys(sinks, 0.0)
     for _ in range(rounds):
-        for name, sink in sinks.items():
+        for system, sink in sinks.items():
             sink.switch_on()
             before = len(talker.lines)
             talker.say("go")
             line = talker.wait_for("times", TIMEOUT, after=before)
-            times[name].append(json.loads(line.partition(" ")[2]))
-            came[name] += sink.switch_off()
+            found = json.loads(line.partition(" ")[2])
+            middle.add(system, statistics.median(found))
+            times[system] += found
+            totals[system] += sink.switch_off()
             talker.wait_for("gone", TIMEOUT, after=before)
-    return times, came
+    for system, found in times.items():
+        slow.add(system, percentile(found, 99))
+        came.add(system, totals[system])
+    return [middle, slow, came]

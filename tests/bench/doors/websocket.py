@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import statistics
 import time
 from pathlib import Path
 
 from network import Network, Program, eventually, free_port
 
-from ..clouds import CLOUD_BYTES, Copies, Listener, Readers, publishing_times  # noqa: TID252  # no package
-from ..figures import OWN, Figure, percentile  # noqa: TID252  # tests is no package
+from ..clouds import CLOUD_BYTES, Copies, Listener, Readers, publishing_figures  # noqa: TID252  # no package
+from ..figures import OWN, Figure  # noqa: TID252  # tests is no package
 
 __all__ = ("clouds", "idle")
 
@@ -58,9 +57,7 @@ def clouds(rounds: int, *, clients: int = 8) -> list[Figure]:
     for encoding, size in ENCODINGS.items():
         name = f"10 MB to {clients} clients as {encoding}"
         asked = {PLAIN: "about 1", CONTROL: "about 1"}
-        middle = Figure(f"{name}: publishing, median", "ms", asked)
-        slow = Figure(f"{name}: publishing, p99", "ms", asked)
-        seen = Figure(f"{name}: came to each, of {_MESSAGES * rounds}", "messages", asked)
+        came = Figure(f"{name}: came to each, of {_MESSAGES * rounds}", "messages", asked)
         network = Network()
         try:
             sinks = {
@@ -68,15 +65,11 @@ def clouds(rounds: int, *, clients: int = 8) -> list[Figure]:
                 CONTROL: Copies(network, clients),
                 OWN: Readers(network, _bridge(network)[1], clients, _subscribing(encoding), size),
             }
-            times, came = publishing_times(network, sinks, _ROUNDS * rounds)
+            figures += publishing_figures(
+                name, came, network, sinks, _ROUNDS * rounds, _MESSAGES // _ROUNDS
+            )
         finally:
             network.close()
-        for system, found in times.items():
-            for one in found:
-                middle.add(system, statistics.median(one))
-            slow.add(system, percentile([value for one in found for value in one], 99))
-            seen.add(system, came[system])
-        figures += [middle, slow, seen]
     return figures
 
 

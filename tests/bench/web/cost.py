@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,8 +9,8 @@ from pathlib import Path
 from network import Network, Program, eventually
 from web.visitor import Visitor
 
-from ..clouds import Listener, Sink, publishing_times  # noqa: TID252  # tests is no package
-from ..figures import OWN, Figure, percentile  # noqa: TID252  # likewise
+from ..clouds import Listener, Sink, publishing_figures  # noqa: TID252  # tests is no package
+from ..figures import OWN, Figure  # noqa: TID252  # likewise
 from .serving import TIMEOUT, percent_used, serve
 
 __all__ = ("clouds", "idle", "many")
@@ -87,22 +86,14 @@ class _Pages:
 def clouds(rounds: int, count: int = 10) -> list[Figure]:
     """Measure how long a publisher of clouds takes, for one node and for pages that show them."""
     name = f"10 MB on {count} pages"
-    middle = Figure(f"{name}: publishing, median", "ms", {PLAIN: "about 1"})
-    slow = Figure(f"{name}: publishing, p99", "ms", {PLAIN: "about 1"})
     seen = Figure(f"{name}: changes shown on each, of {40 * rounds}", "", {PLAIN: "-"})
     network = Network()
     try:
         pages = _Pages(serve(network)[1], count)
         sinks: dict[str, Sink] = {PLAIN: Listener(network), OWN: pages}
-        times, came = publishing_times(network, sinks, 2 * rounds, count=20)
+        return publishing_figures(name, seen, network, sinks, 2 * rounds, count=20)
     finally:
         network.close()
-    for system, found in times.items():
-        for one in found:
-            middle.add(system, statistics.median(one))
-        slow.add(system, percentile([value for one in found for value in one], 99))
-        seen.add(system, came[system])
-    return [middle, slow, seen]
 
 
 def many(_rounds: int, count: int = 100) -> list[Figure]:
