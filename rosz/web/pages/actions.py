@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import time
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 
 from rosz.web.model import ActionRow, Actions, ActionUse, GoalRow, SentGoal, System
 from rosz.web.pages.form import MessageForm
-from rosz.web.pages.layout import Frame, address_of, empty_state
+from rosz.web.pages.layout import (
+    Frame,
+    address_of,
+    column,
+    empty_state,
+    offer_choice,
+    query_of,
+)
 
 __all__ = ("show_actions",)
 
@@ -70,32 +76,19 @@ class _ActionsPage:
             use.close()
 
     def _add_table(self) -> ui.table:
-        names = {"name": "Action", "type": "Type", "servers": "Node"}
-        classes = {"type": "rosz-soft", "servers": "rosz-wide"}
-        columns: list[dict[str, Any]] = [
-            {
-                "name": name,
-                "label": label,
-                "field": name,
-                "align": "left",
-                "sortable": True,
-                "classes": classes.get(name, ""),
-                "headerClasses": "rosz-wide" if name == "servers" else "",
-            }
-            for name, label in names.items()
+        columns = [
+            column("name", "Action"),
+            column("type", "Type", "rosz-soft"),
+            column("servers", "Node", "rosz-wide"),
         ]
         with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full"):
             ui.label("Actions").classes("text-base font-semibold")
             table = (
                 ui.table(rows=[], columns=columns, row_key="name", pagination=12)
-                .classes("w-full cursor-pointer")
+                .classes("w-full")
                 .props("flat dense")
             )
-            table.on(
-                "row-click",
-                lambda event: self._choose(event.args["name"]),
-                js_handler="(event, row) => emit({name: row.name})",
-            )
+            offer_choice(table, self._choose)
         return table
 
     def _add_form(self) -> None:
@@ -119,7 +112,13 @@ class _ActionsPage:
         found = self._actions.rows(self._graph.survey().view)
         self._rows = {one.name: one for one in found}
         rows = [
-            {"name": one.name, "type": one.type, "servers": ", ".join(one.servers)} for one in found
+            {
+                "name": one.name,
+                "address": query_of("/actions", action=one.name),
+                "type": one.type,
+                "servers": ", ".join(one.servers),
+            }
+            for one in found
         ]
         if self._table.rows != rows:
             self._table.rows = rows
@@ -139,7 +138,7 @@ class _ActionsPage:
         self._form.clear()
         for button in (self._send_button, self._cancel_button):
             button.disable()
-        address_of(f"/actions?{urlencode({'action': name}, safe='/')}")
+        address_of(query_of("/actions", action=name))
         view = self._graph.survey().view
         use = await self._frame.attempt(lambda: self._actions.use(view, name))
         if use is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from typing import Any, cast
-from urllib.parse import quote, urlencode
+from urllib.parse import quote
 
 from nicegui import run, ui
 
@@ -21,7 +21,15 @@ from rosz.web.model import (
     RecordOrder,
     System,
 )
-from rosz.web.pages.layout import Frame, address_of, bandwidth_text, size_text
+from rosz.web.pages.layout import (
+    Frame,
+    address_of,
+    bandwidth_text,
+    column,
+    offer_choice,
+    query_of,
+    size_text,
+)
 
 __all__ = ("show_bags",)
 
@@ -64,16 +72,10 @@ class _BagsPage:
         frame.every(_PERIOD, self._refresh)
 
     def _add_list(self) -> None:
-        names = {"name": "Bag", "size": "Size", "changed": "Changed"}
-        columns: list[dict[str, Any]] = [
-            {
-                "name": name,
-                "label": label,
-                "field": name,
-                "align": "left" if name == "name" else "right",
-                "classes": "break-all whitespace-normal" if name == "name" else "rosz-number",
-            }
-            for name, label in names.items()
+        columns = [
+            column("name", "Bag", "break-all whitespace-normal"),
+            column("size", "Size", "rosz-number", align="right", sort="bytes"),
+            column("changed", "Changed", "rosz-number", align="right", sort="stamp"),
         ]
         with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full"):
             ui.label("Bags").classes("text-base font-semibold")
@@ -85,15 +87,14 @@ class _BagsPage:
             self._empty.classes("rosz-soft").set_visibility(False)
             self._table = (
                 ui.table(rows=[], columns=columns, row_key="name", pagination=10)
-                .classes("w-full cursor-pointer")
+                .classes("w-full")
                 .props("flat dense")
             )
             self._table.set_visibility(False)
-            self._table.on(
-                "row-click",
-                lambda event: self._contents.show(event.args["name"]),
-                js_handler="(event, row) => emit({name: row.name})",
-            )
+            offer_choice(self._table, self._choose)
+
+    async def _choose(self, name: str) -> None:
+        await self._contents.show(name)
 
     async def _list(self) -> None:
         try:
@@ -103,7 +104,14 @@ class _BagsPage:
             return
         self._fault.set_text("")
         rows = [
-            {"name": one.name, "size": size_text(one.size), "changed": _date(one.changed)}
+            {
+                "name": one.name,
+                "address": query_of("/bags", bag=one.name),
+                "size": size_text(one.size),
+                "bytes": one.size,
+                "changed": _date(one.changed),
+                "stamp": one.changed,
+            }
             for one in found or ()
         ]
         if self._table.rows != rows:
@@ -338,7 +346,7 @@ class _Contents:
     async def show(self, name: str) -> None:
         """Show a bag."""
         self._name = name
-        address_of(f"/bags?{urlencode({'bag': name})}")
+        address_of(query_of("/bags", bag=name))
         self._card.clear()
         with self._card:
             ui.label(name).classes("text-base font-semibold break-all")

@@ -5,8 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import math
 import time
-from typing import Any
-from urllib.parse import urlencode
 
 import msgspec
 from nicegui import ui
@@ -15,7 +13,7 @@ from rosz.errors import UsageError
 from rosz.introspect.nodes import find_nodes, get_levels, set_level
 from rosz.introspect.rosout import LogFilter, LogLine, format_line
 from rosz.web.model import System
-from rosz.web.pages.layout import Frame, address_of, empty_state
+from rosz.web.pages.layout import Frame, address_of, column, empty_state, query_of
 
 __all__ = ("Wanted", "show_console")
 
@@ -28,6 +26,11 @@ _LEVEL_CELL = """<q-td :props="props"><q-badge :class="'rosz-level-' + props.val
 _TEXT_CELL = """<q-td :props="props" style="white-space: pre-wrap; word-break: break-word">
 {{ props.value }}<div class="rosz-soft rosz-narrow" style="font-size: .75rem">
 {{ props.row.node }} {{ props.row.time }}</div></q-td>"""
+_NODE_CELL = """<q-td :props="props"><a :href="props.row.address"
+@click.exact.prevent>{{ props.value }}</a></q-td>"""
+_PICK_NODE = """(event, row) => {
+  if (event.target.closest('a') && event.defaultPrevented) emit(row.node);
+}"""
 
 
 class Wanted(msgspec.Struct, frozen=True):
@@ -99,6 +102,7 @@ class _Console:
 
     def _add_filter(self) -> None:
         choice = self._choice
+        self._inputs: dict[str, ui.input] = {}
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
             ui.select(
                 _LEVELS,
@@ -112,13 +116,14 @@ class _Console:
                 ("begin", "From", "type=time step=1 stack-label"),
                 ("end", "To", "type=time step=1 stack-label"),
             ):
-                ui.input(
+                self._inputs[field] = ui.input(
                     label,
                     value=getattr(choice, field),
                     on_change=lambda change, field=field: self._filter(
                         **{field: change.value or ""}
                     ),
-                ).props(f"dense debounce=300 {props}").classes("w-32")
+                )
+                self._inputs[field].props(f"dense debounce=300 {props}").classes("w-32")
             ui.space()
             self._pause = ui.button("Pause", icon="pause", on_click=self._toggle).props(
                 "flat dense no-caps"
@@ -130,16 +135,6 @@ class _Console:
             ui.button("Levels", icon="tune", on_click=self._show_levels).props("flat dense no-caps")
 
     def _add_table(self) -> ui.table:
-        def column(name: str, label: str, classes: str = "") -> dict[str, Any]:
-            return {
-                "name": name,
-                "label": label,
-                "field": name,
-                "align": "left",
-                "classes": classes,
-                "headerClasses": classes.replace("rosz-soft", ""),
-            }
-
         table = (
             ui.table(
                 rows=[],
@@ -158,6 +153,12 @@ class _Console:
         table.style("max-height: calc(100vh - 220px)")
         table.add_slot("body-cell-level", _LEVEL_CELL)
         table.add_slot("body-cell-text", _TEXT_CELL)
+        table.add_slot("body-cell-node", _NODE_CELL)
+        table.on(
+            "row-click",
+            lambda event: self._inputs["node"].set_value(str(event.args)),
+            js_handler=_PICK_NODE,
+        )
         return table
 
     def _filter(self, **changes: str) -> None:
@@ -168,7 +169,7 @@ class _Console:
             for name, value in msgspec.structs.asdict(self._choice).items()
             if value != getattr(Wanted(), name)
         }
-        address_of("/console?" + urlencode(given, safe="/:") if given else "/console")
+        address_of(query_of("/console", **given))
         self._shown = None
         self._refresh()
 
@@ -210,6 +211,7 @@ class _Console:
                 "level": line.level,
                 "text": line.text,
                 "node": line.node,
+                "address": query_of("/console", node=line.node),
                 "time": time.strftime("%H:%M:%S", time.localtime(line.stamp))
                 + f".{line.stamp % 1 * 1000:03.0f}"[:4],
                 "place": f"{line.file.rpartition('/')[2]}:{line.line}",

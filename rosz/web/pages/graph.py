@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from typing import NamedTuple, get_args
-from urllib.parse import urlencode
 
 import msgspec
 from nicegui import background_tasks, run, ui
@@ -26,7 +25,7 @@ from rosz.introspect.survey import Survey
 from rosz.introspect.topics import format_topic
 from rosz.names import short_type
 from rosz.web.model import System, Traffic
-from rosz.web.pages.layout import Frame, address_of, empty_state, short_rate_text
+from rosz.web.pages.layout import Frame, address_of, empty_state, query_of, short_rate_text
 
 __all__ = ("show_graph",)
 
@@ -66,6 +65,7 @@ def show_graph(
     group: int,
     hide: str,
     labels: str,
+    pick: str,
 ) -> None:
     """Build the page.
 
@@ -77,6 +77,7 @@ def show_graph(
         group: Depth of the namespaces that get a frame.
         hide: What is left out, such as ``tf,leaves``; the choice of rqt_graph if it is ``usual``.
         labels: What is written on arrows, of ``rates`` and ``types``.
+        pick: What to tell of, such as ``node:/talker``; empty for nothing.
     """
     shown: Content = "nodes"
     for one in get_args(Content):
@@ -87,7 +88,7 @@ def show_graph(
         hidden = set(hide.split(","))
         switches = {name: name.removeprefix("hide_") in hidden for name in _SWITCHES}
         options = msgspec.structs.replace(options, **switches)
-    _Graph(system, options, [one for one in _LABELS if one in labels.split(",")])
+    _Graph(system, options, [one for one in _LABELS if one in labels.split(",")], pick)
 
 
 class _Shown(NamedTuple):
@@ -111,9 +112,12 @@ class _Graph:
         system: The system.
         options: What is shown at first.
         labels: What is written on arrows at first.
+        pick: Key of the box that it tells of at first; empty for none.
     """
 
-    def __init__(self, system: System, options: PictureOptions, labels: list[str]) -> None:
+    def __init__(
+        self, system: System, options: PictureOptions, labels: list[str], pick: str
+    ) -> None:
         self._options = options
         self._written = tuple(labels)
         self._frame = frame = Frame(system, "Graph", "/graph")
@@ -126,7 +130,8 @@ class _Graph:
         self._drawn = False
         self._labels: dict[int, str] = {}
         self._picture = Picture()
-        self._chosen = ""
+        self._chosen = pick
+        self._described = not pick
         self._zoom = 100
         with frame.content:
             self._add_choices()
@@ -230,7 +235,7 @@ class _Graph:
             query["hide"] = ",".join(name.removeprefix("hide_") for name in hidden)
         if self._written != ("rates",):
             query["labels"] = ",".join(self._written)
-        address_of("/graph?" + urlencode(query, safe="/*,") if query else "/graph")
+        address_of(query_of("/graph", **query, pick=self._chosen))
 
     def _choose_label(self, name: str, *, shown: bool) -> None:
         self._written = tuple(
@@ -246,6 +251,9 @@ class _Graph:
     def _refresh(self) -> None:
         """Draw what has changed; the rates on the arrows change once a second."""
         survey, now = self._watch.survey(), time.monotonic()
+        if not self._described and self._watch.complete:
+            with self._frame.content:
+                self._describe_chosen()
         wanted = survey, self._options, self._chosen, self._written
         if wanted == self._wanted and now < self._due:
             return
@@ -290,8 +298,15 @@ class _Graph:
         return found
 
     def _pick(self, event: GenericEventArguments) -> None:
-        kind, _, name = str(event.args).partition(":")
         self._chosen = str(event.args)
+        self._describe_chosen()
+        self._show_address()
+        self._refresh()
+
+    def _describe_chosen(self) -> None:
+        """Tell of what is chosen."""
+        self._described = True
+        kind, _, name = self._chosen.partition(":")
         try:
             text = _describe(self._watch.survey(), kind, name)
         except RoszError as error:
@@ -301,9 +316,9 @@ class _Graph:
             ui.label(text).classes("rosz-mono whitespace-pre-wrap break-all")
             with ui.row().classes("w-full justify-end"):
                 if kind == "topic":
-                    ui.link("Open the topic", f"/topics?{urlencode({'topic': name}, safe='/')}")
+                    ui.link("Open the topic", query_of("/topics", topic=name))
                 ui.button("Close", on_click=dialog.close).props("flat no-caps")
-        self._refresh()
+        dialog.on("hide", dialog.delete)
 
 
 def _changes(before: dict[int, str], labels: list[str]) -> dict[int, str]:

@@ -6,6 +6,7 @@ import json
 import logging
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
+from urllib.parse import urlencode
 
 from nicegui import run, ui
 
@@ -22,6 +23,8 @@ __all__ = (
     "column",
     "duration_text",
     "empty_state",
+    "offer_choice",
+    "query_of",
     "rate_text",
     "short_rate_text",
     "size_text",
@@ -35,6 +38,11 @@ _THEME_COOKIE = "rosz-theme"
 _THEMES = {"auto": None, "light": False, "dark": True}
 _THEME_ICONS = {"auto": "brightness_auto", "light": "light_mode", "dark": "dark_mode"}
 _KILO = 1000.0
+_CHOICE_CELL = """<q-td :props="props"><a :href="props.row.address" @click.exact.prevent>
+{{ props.value }}</a></q-td>"""
+_CHOICE = """(event, row) => {
+  if (event.defaultPrevented || !event.target.closest('a')) emit(row.name);
+}"""
 
 
 class Entry(NamedTuple):
@@ -294,6 +302,29 @@ def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.colum
 def address_of(path: str) -> None:
     """Show the address that the page has now, so that it can be kept and sent."""
     ui.run_javascript(f"history.replaceState(null, '', {json.dumps(path)})")
+
+
+def query_of(path: str, **given: str) -> str:
+    """Return the address of a page with what it shows; empty values are left out.
+
+    Args:
+        path: Its path.
+        given: The names of the query with their values.
+    """
+    query = urlencode({name: value for name, value in given.items() if value}, safe="/,:*[]")
+    return f"{path}?{query}" if query else path
+
+
+def offer_choice(table: ui.table, choose: Callable[[str], object]) -> None:
+    """Let a row be chosen by a click, or by its name, which is a link, with the keyboard.
+
+    Args:
+        table: A table whose rows have a ``name``, and an ``address`` that shows it.
+        choose: Function that is called with the name.
+    """
+    table.classes("cursor-pointer")
+    table.add_slot("body-cell-name", _CHOICE_CELL)
+    table.on("row-click", lambda event: choose(str(event.args)), js_handler=_CHOICE)
 
 
 def column(

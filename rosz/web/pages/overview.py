@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from typing import Any
-from urllib.parse import quote
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
@@ -21,6 +20,7 @@ from rosz.web.pages.layout import (
     column,
     duration_text,
     empty_state,
+    query_of,
     rate_text,
 )
 from rosz.wire import Kind
@@ -218,6 +218,7 @@ class _Tables:
                 .props("flat dense")
             )
 
+        self.nodes.add_slot("body-cell-name", _LINK_CELL)
         self.nodes.add_slot("body-cell-buttons", _KILL_CELL)
         self.nodes.on("kill", self._kill)
 
@@ -271,6 +272,9 @@ class _Tables:
             {
                 "key": f"{one.name} {one.session} {one.pid}",
                 "name": one.name,
+                "address": query_of(
+                    "/graph", content="all", nodes=one.name, pick=f"node:{one.name}"
+                ),
                 "host": one.host or "—",
                 "pid": one.pid or "—",
                 "since": _since(one.started),
@@ -295,7 +299,7 @@ class _Tables:
         latency = None if flow is None else flow.latency
         return {
             "name": name,
-            "address": f"/topics?topic={quote(name, safe='/')}",
+            "address": query_of("/topics", topic=name),
             "type": type_text,
             "rate": "—" if flow is None else rate_text(flow.rate),
             "rate_value": -1.0 if flow is None else round(flow.rate, 1),

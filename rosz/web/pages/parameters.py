@@ -12,7 +12,7 @@ from rosz.errors import YamlError
 from rosz.params import Value, type_name
 from rosz.params.yaml import inline
 from rosz.web.model import System
-from rosz.web.pages.layout import Frame, empty_state
+from rosz.web.pages.layout import Frame, address_of, empty_state, query_of
 
 __all__ = ("show_parameters",)
 
@@ -25,26 +25,29 @@ _HEADER = """<div class="row items-center no-wrap full-width" style="gap: .5rem"
 </div>"""
 
 
-def show_parameters(system: System, prefix: str) -> None:
+def show_parameters(system: System, prefix: str, name: str) -> None:
     """Build the page.
 
     Args:
         system: The system.
         prefix: Text that the shown names contain.
+        name: Parameter to edit; empty for none.
     """
-    _Parameters(system, prefix)
+    _Parameters(system, prefix, name)
 
 
 class _Parameters:
     """The tree, its filter, and the changes."""
 
-    def __init__(self, system: System, prefix: str) -> None:
+    def __init__(self, system: System, prefix: str, name: str) -> None:
         self._system = system
         self._frame = frame = Frame(system, "Parameters", "/parameters")
         self._parameters = frame.use(system.parameters)
         self._values: dict[str, Value] = {}
         self._seen: object = None
         self._opened: set[str] = set()
+        self._chosen = name
+        self._wanted = name
         with frame.content:
             self._add_tools(prefix)
             self._empty = empty_state(
@@ -74,7 +77,7 @@ class _Parameters:
     def _add_tools(self, prefix: str) -> None:
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
             self._search = (
-                ui.input("Filter", value=prefix, on_change=self._refresh)
+                ui.input("Filter", value=prefix, on_change=self._filter)
                 .props("dense clearable debounce=300")
                 .classes("grow min-w-40")
             )
@@ -87,6 +90,14 @@ class _Parameters:
             ui.button("Load", icon="upload", on_click=lambda: upload.run_method("pickFiles")).props(
                 "flat dense no-caps"
             )
+
+    def _filter(self) -> None:
+        self._show_address()
+        self._refresh()
+
+    def _show_address(self) -> None:
+        prefix = str(self._search.value or "")
+        address_of(query_of("/parameters", prefix=prefix, name=self._chosen))
 
     def _refresh(self) -> None:
         wanted = self._search.value or ""
@@ -107,6 +118,17 @@ class _Parameters:
         self._card.set_visibility(bool(nodes))
         self._empty.set_visibility(not nodes and not wanted)
         self._show_changes()
+        self._open_wanted()
+
+    def _open_wanted(self) -> None:
+        """Edit the parameter that the address names, as soon as there is one."""
+        name = self._wanted
+        if name and name in self._values:
+            self._wanted = ""
+            self._frame.show_fault("")
+            self._edit(name)
+        elif name:
+            self._frame.show_fault(f"no parameter '{name}' is set")
 
     def _show_changes(self) -> None:
         self._changes.clear()
@@ -130,7 +152,15 @@ class _Parameters:
 
     def _edit(self, name: str) -> None:
         value = self._values.get(name)
-        with ui.dialog(value=True) as dialog, ui.card().classes("rosz-card w-96"):
+        self._chosen = name
+        self._show_address()
+
+        def leave() -> None:
+            self._chosen = ""
+            self._show_address()
+            dialog.delete()
+
+        with ui.dialog(value=True).on("hide", leave) as dialog, ui.card().classes("rosz-card w-96"):
             ui.label(name or "New parameter").classes("text-base font-semibold break-all")
             field = ui.input("Name", value="/") if not name else None
             if isinstance(value, bool):

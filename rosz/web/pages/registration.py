@@ -46,11 +46,13 @@ def add_pages(system: System) -> None:
         content: str = "nodes",
         nodes: str = "",
         topics: str = "",
+        *,
         group: int = 0,
         hide: str = "usual",
         labels: str = "rates",
+        pick: str = "",
     ) -> None:
-        show_graph(system, content, nodes, topics, group=group, hide=hide, labels=labels)
+        show_graph(system, content, nodes, topics, group=group, hide=hide, labels=labels, pick=pick)
 
 
 def _add_pages_of_launches(system: System) -> None:
@@ -87,8 +89,8 @@ def _add_pages_of_data(system: System) -> None:
 
 def _add_pages_of_nodes(system: System) -> None:
     @ui.page("/parameters")
-    def parameters(prefix: str = "") -> None:
-        show_parameters(system, prefix)
+    def parameters(prefix: str = "", name: str = "") -> None:
+        show_parameters(system, prefix, name)
 
     @ui.page("/plot")
     def plot(fields: str = "", window: int = 10, times: str = "arrival") -> None:

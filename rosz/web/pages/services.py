@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-from urllib.parse import urlencode
-
 from nicegui import ui
 
 from rosz.introspect.services import list_services
 from rosz.web.model import System, call_service, service_type
 from rosz.web.pages.form import MessageForm
-from rosz.web.pages.layout import Frame, address_of, empty_state
+from rosz.web.pages.layout import (
+    Frame,
+    address_of,
+    column,
+    empty_state,
+    offer_choice,
+    query_of,
+)
 
 __all__ = ("show_services",)
 
@@ -60,16 +64,6 @@ class _Services:
         frame.every(_PERIOD, self._refresh)
 
     def _add_table(self, search: ui.input) -> ui.table:
-        def column(name: str, label: str, classes: str = "") -> dict[str, Any]:
-            return {
-                "name": name,
-                "label": label,
-                "field": name,
-                "align": "left",
-                "sortable": True,
-                "classes": classes,
-            }
-
         table = (
             ui.table(
                 rows=[],
@@ -81,15 +75,10 @@ class _Services:
                 row_key="name",
                 pagination=12,
             )
-            .classes("w-full cursor-pointer")
+            .classes("w-full")
             .props("flat dense")
         )
-        table.columns[2]["headerClasses"] = "rosz-wide"
-        table.on(
-            "row-click",
-            lambda event: self._choose(event.args["name"]),
-            js_handler="(event, row) => emit({name: row.name})",
-        )
+        offer_choice(table, self._choose)
         search.on_value_change(lambda change: setattr(table, "filter", change.value or ""))
         return table
 
@@ -113,7 +102,12 @@ class _Services:
         ]
         self._types = {one.name: one.types[0] for one in entries}
         rows = [
-            {"name": one.name, "type": ", ".join(one.types), "nodes": ", ".join(one.nodes)}
+            {
+                "name": one.name,
+                "address": query_of("/services", service=one.name),
+                "type": ", ".join(one.types),
+                "nodes": ", ".join(one.nodes),
+            }
             for one in entries
         ]
         if self._table.rows != rows:
@@ -128,7 +122,7 @@ class _Services:
         self._type.set_text(self._types.get(name, ""))
         self._answer.set_text("")
         self._button.disable()
-        address_of(f"/services?{urlencode({'service': name}, safe='/')}")
+        address_of(query_of("/services", service=name))
         self._form.clear()
         view = self._graph.survey().view
         cls = await self._frame.attempt(lambda: service_type(self._system.node, view, name))
