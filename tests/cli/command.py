@@ -35,7 +35,7 @@ def rosz(
         input=text,
         capture_output=True,
         text=True,
-        timeout=40,
+        timeout=300,
         check=False,
     )
 

@@ -57,7 +57,7 @@ def launch(network: Network) -> Iterator[Start]:
         with suppress(ProcessLookupError):
             program.send(signal.SIGTERM)
         with suppress(subprocess.TimeoutExpired):
-            program.process.wait(10)
+            program.process.wait(60)
     ProcessTree(tag).kill()  # what is left would keep the pipes open
     for program in programs:
         program.close()

@@ -36,6 +36,6 @@ def rosz(network: Network, *words: str) -> subprocess.CompletedProcess[str]:
         env=network.variables(),
         capture_output=True,
         text=True,
-        timeout=40,
+        timeout=300,
         check=False,
     )

@@ -49,7 +49,7 @@ def test_the_configuration_for_zenohd(shell: Shell, network: Network) -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_core_ends_at_once(core: Program, number: signal.Signals) -> None:
     core.send(number)
-    assert core.exit_code(timeout=3) == 0
+    assert core.exit_code() == 0
     assert len(core.lines) == 3
 
 
@@ -121,7 +121,7 @@ def test_a_core_and_commands_that_wait_for_it(shell: Shell, network: Network) ->
     core.wait_for("started core")
     assert core.lines[0] == f"listening on {network.rendezvous}"
     for program in waiting:
-        assert program.exit_code(30) == 0
+        assert program.exit_code() == 0
 
 
 @pytest.mark.usefixtures("core")

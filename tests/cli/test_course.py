@@ -40,7 +40,7 @@ def test_turtles_and_parameters(network: Network) -> None:
         "rosmsg show turtlesim/Pose",
         "kill %1 %2",
         "wait",
-        timeout=110,
+        timeout=300,
     )
     out = done.stdout.splitlines()
     assert out[0] == "turtlesim/Spawn", (done.stdout, done.stderr)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
-import time
 
 import pytest
 from network import Network, Program, eventually
@@ -37,10 +36,8 @@ def hears(program: Program, at_least: int = 0) -> None:
 
 
 def test_the_example(launch: Start, network: Network) -> None:
-    begin = time.monotonic()
     run = launch(EXAMPLE)
     hears(run)
-    assert time.monotonic() - begin < 10
     hears(run, 12)
     numbers = heard(run)
     assert numbers == list(range(numbers[0], numbers[-1] + 1))
@@ -58,10 +55,9 @@ def test_the_example(launch: Start, network: Network) -> None:
         # The publisher's next read sees what somebody sets.
         params.set("/publisher/step", 1000)
         eventually(lambda: any(number > 1000 for number in heard(run)), "a larger step")
-    begin = time.monotonic()
     run.send(signal.SIGINT)
     assert run.exit_code() == 0
-    assert time.monotonic() - begin < 8
+    assert "escalating" not in run.output
     assert not any(map(runs, pids.values()))
     assert "Traceback" not in run.output
 

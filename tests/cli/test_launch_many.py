@@ -58,7 +58,7 @@ def test_many_nodes_start_and_stop(launch: Start, network: Network) -> None:
     run = launch(fleet(network.folder, TALKER, count))
     run.wait_for(UP, 100, times=count)
     run.send(signal.SIGINT)
-    assert run.exit_code(40) == 0
+    assert run.exit_code() == 0
     pids = started(run)
     assert [line for line in run.lines if not EXPECTED.match(line)] == []
     assert len(pids) == count
@@ -78,7 +78,7 @@ def test_a_killed_launch_takes_its_core_along(launch: Start, network: Network) -
 
 def test_a_launch_killed_as_its_core_comes_up_leaves_none(launch: Start, network: Network) -> None:
     run = launch(fleet(network.folder, STUBBORN, 1), ROSZ_CONNECT="tcp/127.0.0.1:9")
-    eventually(lambda: is_listening(network.rendezvous), "the core", 30)
+    eventually(lambda: is_listening(network.rendezvous), "the core")
     run.send(signal.SIGKILL)
     eventually(lambda: not is_listening(network.rendezvous), "the end of the core")
     eventually(lambda: not any(map(runs, started(run).values())), "the end of the node")
@@ -91,7 +91,9 @@ def test_twenty_stubborn_nodes_end_in_time(launch: Start, network: Network) -> N
     begin = time.monotonic()
     run.send(signal.SIGINT)
     assert run.exit_code() == 0
-    assert 1 <= time.monotonic() - begin < 10
+    assert time.monotonic() - begin >= 1
+    signals = re.findall(r"escalating to (SIG\w+)", run.output)
+    assert signals == ["SIGTERM"] * 20 + ["SIGKILL"] * 20  # all at the same time
     assert run.output.count("did not end when asked to, and was killed") == 20
     assert not any(map(runs, started(run).values()))
 
@@ -103,9 +105,9 @@ def test_a_launch_ended_as_its_core_comes_up_leaves_none(
     file = fleet(network.folder, TALKER, 26)
     for _ in range(repeats(1, 20)):
         run = launch(file)
-        eventually(lambda: is_listening(network.rendezvous), "the core", 30)
+        eventually(lambda: is_listening(network.rendezvous), "the core")
         run.send(number)
-        assert run.exit_code(40) in {0, 130}
+        assert run.exit_code() in {0, 130}
         assert "Traceback" not in INTERRUPTED_IMPORT.sub("", run.output)
         assert not is_listening(network.rendezvous)
         assert not any(map(runs, started(run).values()))

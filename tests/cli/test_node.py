@@ -62,7 +62,7 @@ def test_a_killed_node_is_gone(shell: Shell, network: Network) -> None:
     victim.wait_for("ready")
     assert "/victim" in shell("node", "list").lines
     victim.kill()
-    eventually(lambda: "/victim" not in shell("node", "list").lines, "the end", timeout=2)
+    eventually(lambda: "/victim" not in shell("node", "list").lines, "the end")
 
 
 def test_info(shell: Shell, talker: Node, network: Network) -> None:

@@ -317,7 +317,7 @@ def test_dump_to_what_is_no_file(replica: Replica, tmp_path: Path, target: str) 
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=40,
+        timeout=300,
         check=False,
     )
     assert (done.stdout, done.stderr) == ("a: 1\n", "")
@@ -409,7 +409,7 @@ def test_watching_in_a_process_of_its_own(
     replica.set("/other", 1)
     replica.delete("/ns/a")
     replica.set("/ns/c", [1])
-    out, err = watcher.communicate(timeout=20)
+    out, err = watcher.communicate(timeout=60)
     assert out == '~ /ns/a: 1 -> 2\n+ /ns/b: "two\\nlines"\n- /ns/a: 2\n+ /ns/c: [1]\n'
     assert (watcher.returncode, err) == (0, "")
 

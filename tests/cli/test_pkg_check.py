@@ -63,7 +63,7 @@ def test_the_steps_of_a_course(network: Network, shell: str) -> None:
         "timeout 60 sh -c 'until rostopic list 2>/dev/null | grep -q /numbers; do :; done'",
         "rostopic echo -n 1 /numbers",
         "rosnode kill /talker",
-        timeout=110,
+        timeout=300,
     )
     assert "WARNING: dependency" not in done.stderr
     out = done.stdout

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import json
 import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -299,10 +298,8 @@ def test_a_stopped_node_does_not_block(shell: Shell, network: Network) -> None:
     program.send(signal.SIGSTOP)
     eventually(lambda: stopped(program), "all threads stopped")
     try:
-        began = time.monotonic()
         assert shell("reconfigure", "get", "-t", "0.5", "late").code == 1
         assert shell("reconfigure", "set", "-t", "0.5", "late", "steps", "1").code == 1
         assert shell("reconfigure", "get", "robot", "steps").out == "50\n"
-        assert time.monotonic() - began < 15
     finally:
         program.send(signal.SIGCONT)

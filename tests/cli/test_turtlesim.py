@@ -28,7 +28,7 @@ def test_snapshot_to_stdout(network: Network, sim: Simulator) -> None:
         [sys.executable, "-m", "rosz", "turtlesim", "snapshot", "-"],
         env=network.variables(),
         capture_output=True,
-        timeout=40,
+        timeout=300,
         check=True,
     )
     assert done.stdout == sim.picture().png

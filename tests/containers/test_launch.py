@@ -68,8 +68,8 @@ def test_what_is_no_python_runs_as_a_process_of_its_own(box: Program) -> None:
     box.wait_for(
         re.compile("WARNING: .*0.launch:.*node '/alone' .*'/box'.*not a Python script"), 60
     )
-    box.wait_for(re.compile(r"process\[alone-\d+\]: started"), 30)
-    box.wait_for(re.compile("cannot launch node of type .pk/gone.py.: package 'pk'"), 30)
+    box.wait_for(re.compile(r"process\[alone-\d+\]: started"))
+    box.wait_for(re.compile("cannot launch node of type .pk/gone.py.: package 'pk'"))
 
 
 def test_lines_for_nodelets_run_python_nodes(box: Program) -> None:
@@ -79,7 +79,7 @@ def test_lines_for_nodelets_run_python_nodes(box: Program) -> None:
 
 
 def test_a_crash_names_the_node_and_it_starts_again(box: Program) -> None:
-    box.wait_for(re.compile(r"crasher.py\", line 5, in <module>"), 30)
+    box.wait_for(re.compile(r"crasher.py\", line 5, in <module>"))
     box.wait_for(
         re.compile("ERROR: node '/c1' .*crasher.py.* of container '/box' has died, exit code 1:"
                    " ValueError: broken on purpose"), 30, times=2,
@@ -90,32 +90,32 @@ def test_a_crash_names_the_node_and_it_starts_again(box: Program) -> None:
 def test_the_status_shows_the_members(site: Site, box: Program) -> None:
     _pid(box, "/n1")
     status = site.rosz("launch", "--status")
-    assert status.exit_code(30) == 0
+    assert status.exit_code() == 0
     assert re.search(r"/box +running .*\n +/deep/t1 +in /box", status.output)
     stop = site.rosz("launch", "--stop", "/t2")
-    assert stop.exit_code(30) == 1
+    assert stop.exit_code() == 1
     assert "it is in container '/box'" in stop.output
     listing = site.rosz("node", "list")
-    assert listing.exit_code(30) == 0
+    assert listing.exit_code() == 0
     assert {"/deep/t1", "/l1", "/n1", "/t2", "/manager", "/load1"} <= set(listing.lines)
 
 
 def test_one_node_is_killed_and_the_others_stay(site: Site, box: Program) -> None:
     _pid(box, "/n1")
-    assert site.rosz("node", "kill", "/n1").exit_code(30) == 0
+    assert site.rosz("node", "kill", "/n1").exit_code() == 0
     box.wait_for("end of /n1")
     box.wait_for(re.compile("node '/n1' .* has finished cleanly"))
     late = site.rosz("run", "pk", "listener.py", "__name:=late")
-    late.wait_for("/late heard hello from /t2 of /t2", 30)
+    late.wait_for("/late heard hello from /t2 of /t2")
 
 
 def test_a_container_that_is_killed_starts_again(box: Program) -> None:
     os.kill(_pid(box, "/t2"), signal.SIGKILL)
-    box.wait_for(re.compile(r"process of nodes /deep/t1, /l1, .* has died .*exit code -9"), 30)
+    box.wait_for(re.compile(r"process of nodes /deep/t1, /l1, .* has died .*exit code -9"))
     box.wait_for(re.compile(r"\[box-1\] restarting process"))
     _pid(box, "/t2", times=2)
     box.send(signal.SIGINT)
-    assert box.exit_code(30) == 1  # a node could not be started
+    assert box.exit_code() == 1  # a node could not be started
     assert "bye /deep/t1" in box.output
     assert "bye /load1" in box.output
 
@@ -130,17 +130,17 @@ def test_a_required_node_ends_the_launch(site: Site) -> None:
         <node pkg="pk" type="deaf.py" name="d1"/>
         """
     )
-    assert launch.exit_code(30) == 1
+    assert launch.exit_code() == 1
     assert "REQUIRED node '/c1' has ended: container '/box' ends" in launch.output
     assert "REQUIRED process [box-1] has died!" in launch.output
 
 
 def test_programs_that_never_ask_for_the_shutdown_are_interrupted(site: Site) -> None:
     pair = site.rosz("run", "--with", "pk native.py", "pk", "deaf.py")
-    pair.wait_for("deaf to all", 30)
+    pair.wait_for("deaf to all")
     pair.wait_for("I am /native")
     pair.send(signal.SIGINT)
-    assert pair.exit_code(30) == 0
+    assert pair.exit_code() == 0
     assert "end of /native" in pair.output
     assert "Traceback" not in pair.output
 
@@ -152,7 +152,7 @@ def test_modules_of_one_name_beside_two_scripts_are_refused(site: Site) -> None:
     site.add("one", "user.py", "import rosz, config, threading\nprint('of', config.PLACE)\n"
              "rosz.Node('stays').spin()\n")  # fmt: skip
     pair = site.rosz("run", "--with", "two user.py", "one", "user.py")
-    eventually(lambda: "ImportError: module 'config' is" in pair.output, timeout=30)
+    eventually(lambda: "ImportError: module 'config' is" in pair.output)
     assert re.search("which node '(one|two)/user.py' of this container has imported", pair.output)
 
 
@@ -172,5 +172,5 @@ def test_modules_of_one_name_beside_two_scripts_are_refused(site: Site) -> None:
 )
 def test_wrong_command_lines(site: Site, words: tuple[str, ...], problem: str) -> None:
     command = site.rosz("run", *words)
-    assert command.exit_code(30) in {1, 2}
+    assert command.exit_code() in {1, 2}
     assert problem in command.output

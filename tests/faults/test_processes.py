@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from network import Network, Program
+from network import TIMEOUT, Network, Program
 
 from rosz.graph import Graph
 
@@ -23,17 +23,17 @@ NODE = """
             out.publish(f"{number}.{sys.argv[3]}")
 """
 COUNT = 20
-GONE_BY = 5.0
-HEARD_BY = 10.0
+PATIENT = {"ZENOH_CONFIG_OVERRIDE": "transport/link/tx/lease=3600000"}
+"""Nobody finds out that a process has ended by its silence."""
 
 
 def start(network: Network, number: int, life: int) -> Program:
-    return network.program(NODE, str(number), str(COUNT), str(life))
+    return network.program(NODE, str(number), str(COUNT), str(life), **PATIENT)
 
 
 def wait_until_gone(graph: Graph, name: str) -> float:
     """Return the time at which a node had left the graph."""
-    graph.wait_for(lambda view: name not in view.nodes(), GONE_BY, f"the end of {name}")
+    graph.wait_for(lambda view: name not in view.nodes(), TIMEOUT, f"the end of {name}")
     return time.monotonic()
 
 
@@ -41,11 +41,12 @@ def test_each_dies_and_comes_back(network: Network) -> None:
     """Nobody is special: whoever dies, all others go on, and its next life joins them."""
     programs = [start(network, number, 0) for number in range(COUNT)]
     for number, program in enumerate(programs):
-        program.wait_for(f"heard {(number + 1) % COUNT}.0", 60)
-    observer = network.node("observer")
+        program.wait_for(f"heard {(number + 1) % COUNT}.0")
+    patient = PATIENT["ZENOH_CONFIG_OVERRIDE"]
+    observer = network.node("observer", context=network.context(zenoh_override=patient))
     graph = observer.context.graph
     names = {f"/n{number}" for number in range(COUNT)}
-    graph.wait_for(lambda view: names <= set(view.nodes()), 30, "all nodes")
+    graph.wait_for(lambda view: names <= set(view.nodes()), TIMEOUT, "all nodes")
     gone, back = [], []
     for number in range(COUNT):
         began = time.monotonic()
@@ -57,8 +58,8 @@ def test_each_dies_and_comes_back(network: Network) -> None:
         began = time.monotonic()
         programs[number] = start(network, number, 1)
         before = (number - 1) % COUNT
-        programs[before].wait_for(f"heard {number}.1", HEARD_BY)
-        programs[number].wait_for(f"heard {(number + 1) % COUNT}.", HEARD_BY)
+        programs[before].wait_for(f"heard {number}.1")
+        programs[number].wait_for(f"heard {(number + 1) % COUNT}.")
         back.append(time.monotonic() - began)
         assert len(observer.params.get("/alive")) == COUNT
     print(f"\nkill -9 to gone from the graph: {max(gone):.2f} s at most of {COUNT}")

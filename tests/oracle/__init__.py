@@ -104,7 +104,7 @@ def real(snippet: str, module: str, package: str, *, given: Any = None, home: st
         check=False,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=300,
         cwd=home or None,
         env={
             "PATH": "/usr/bin:/bin",

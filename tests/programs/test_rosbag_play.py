@@ -55,7 +55,7 @@ rospy.Subscriber("/cmd_vel", Twist, twist, queue_size=1000)
 kinds = {"/chatter": String, "/tf": TFMessage, "/once": Int32, "/image": Image}
 for topic, kind in kinds.items():
     rospy.Subscriber(topic, kind, note, topic, queue_size=1000)
-ended = done.wait(30)
+ended = done.wait(60)
 rospy.delete_param("/use_sim_time")
 rospy.sleep(0)
 print("ended", ended, rospy.Time.now().secs - begin)

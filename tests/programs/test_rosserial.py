@@ -331,11 +331,9 @@ def test_the_program_outlives_an_unplugged_device(network: Network, tmp_path: Pa
             port.unlink()
             line.unplug()
             program.wait_for("lost the device")
-    began = time.monotonic()
     program.send(signal.SIGINT)
     assert line.board.receive(TopicInfo.ID_TX_STOP) == b""
     assert program.exit_code() == 0, program.output
-    assert time.monotonic() - began < 5
     assert "Traceback" not in program.output
     line.unplug()
 

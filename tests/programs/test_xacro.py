@@ -48,7 +48,7 @@ def run(network: Network, *words: str) -> subprocess.CompletedProcess[str]:
         cwd=network.folder,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=300,
         check=False,
     )
 

@@ -159,7 +159,7 @@ def rosz(*words: str, workspace: Path, home: Path) -> subprocess.CompletedProces
         },
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
 
@@ -174,7 +174,7 @@ def real(*words: str, devel: Path) -> subprocess.CompletedProcess[str]:
         },
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
 

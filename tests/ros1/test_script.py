@@ -24,7 +24,7 @@ def run(
         text=True,
         cwd=folder,
         env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT), "HOME": str(folder)},
-        timeout=30,
+        timeout=300,
         check=False,
     )
 
@@ -35,7 +35,7 @@ def plain(folder: Path, *args: str, name: str = "node.py") -> subprocess.Complet
         capture_output=True,
         text=True,
         cwd=folder,
-        timeout=30,
+        timeout=300,
         check=False,
     )
 
@@ -172,11 +172,11 @@ def test_other_names_are_not_explained(tmp_path: Path, name: str) -> None:
 def test_usage_errors(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "rosz.ros1"]
     environ = {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, capture_output=True, env=environ, timeout=30, check=False)
+    done = subprocess.run(command, capture_output=True, env=environ, timeout=300, check=False)
     assert (done.returncode, done.stderr[:6]) == (2, b"usage:")
     gone = str(tmp_path / "gone.py")
     done = subprocess.run(
-        [*command, gone], capture_output=True, env=environ, timeout=30, check=False
+        [*command, gone], capture_output=True, env=environ, timeout=300, check=False
     )
     assert done.returncode == 1
     assert done.stderr.decode() == f"ERROR: cannot run '{gone}': No such file or directory\n"

@@ -163,7 +163,7 @@ def test_through_the_waypoints_of_the_tutorial(network: Network) -> None:
         commands.publish(Twist(Vector3(x=forward), Vector3(z=max(-1.0, min(1.0, 2 * error)))))
 
     user.timer(0.1, control)
-    assert arrived.wait(40), f"only {reached}"
+    assert arrived.wait(60), f"only {reached}"
     for place, goal in zip(reached, WAYPOINTS, strict=True):
         assert math.dist(place, goal) < 0.05
 
@@ -181,7 +181,7 @@ def test_launch_files(network: Network, package: str, file: str, x: float) -> No
     try:
         user = network.node("user")
         odometry = Heard(user, "odom", Odometry)
-        eventually(lambda: odometry.last, "odometry", timeout=25)
+        eventually(lambda: odometry.last, "odometry")
         assert odometry.last.pose.pose.position.x == x
         assert user.params["/use_sim_time"] is True
         assert seconds(odometry.last) < 120

@@ -102,7 +102,7 @@ def test_invalid_commands_are_ignored(scene: Scene) -> None:
     commands = scene.user.publisher("turtle1/cmd_vel", Twist, queue_size=1)
     commands.wait_for_subscribers()
     commands.publish(Twist(Vector3(x=math.nan), Vector3()))
-    while "ignoring a command for [turtle1]: forward is 'nan'" not in logged.get(timeout=15).msg:
+    while "ignoring a command for [turtle1]: forward is 'nan'" not in logged.get(timeout=60).msg:
         pass
     commands.publish(Twist(Vector3(), Vector3(z=1.0)))
     assert watcher.wait_for(lambda pose: pose.angular_velocity).x == START

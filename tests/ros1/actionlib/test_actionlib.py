@@ -142,7 +142,7 @@ def test_goal_callbacks(network: Network, path: str) -> None:
         print(client.get_state(), client.wait_for_server(rospy.Duration(15)))
         active = threading.Event()
         client.send_goal(CountGoal(7), active_cb=active.set)
-        active.wait(15)
+        active.wait(60)
         client.cancel_all_goals()
         print(client.wait_for_result(rospy.Duration(15)), client.get_state(), server.is_active())
         lost = actionlib.SimpleActionClient("nothing", CountAction)
@@ -158,7 +158,7 @@ def test_goal_callbacks(network: Network, path: str) -> None:
 def test_handles_of_goals(network: Network) -> None:
     """The file beside the program was written with ROS 1's actionlib and roscore."""
     program = network.run("-m", "rosz.ros1", str(PROGRAMS / "goals.py"))
-    assert program.exit_code(50) == 0, program.output
+    assert program.exit_code() == 0, program.output
     lines = [line for line in program.lines if line.startswith("= ")]
     assert lines == (PROGRAMS / "goals.txt").read_text().splitlines()
 

@@ -123,13 +123,13 @@ def ros(workspace: Path) -> Iterator[Side]:
         start_new_session=True,
     )
     try:
-        eventually(lambda: _answers(variables["ROS_MASTER_URI"]), "roscore", 30)
+        eventually(lambda: _answers(variables["ROS_MASTER_URI"]), "roscore")
         clean = partial(_forget, variables["ROS_MASTER_URI"])
         yield Side([PYTHON], [PYTHON, str(DYNPARAM)], variables, clean)
     finally:
         os.killpg(core.pid, signal.SIGINT)
         try:
-            core.wait(10)
+            core.wait(60)
         except subprocess.TimeoutExpired:
             os.killpg(core.pid, signal.SIGKILL)
             core.wait()

@@ -47,7 +47,7 @@ def theirs(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dict[
         ),
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=300,
         check=False,
         env={"PATH": "/usr/bin:/bin", "HOME": str(folder)},
     )

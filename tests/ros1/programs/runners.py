@@ -146,7 +146,7 @@ class Ros(_Runner):
         if self._core.poll() is None:
             os.killpg(self._core.pid, signal.SIGINT)
         try:
-            self._core.wait(10)
+            self._core.wait(60)
         except subprocess.TimeoutExpired:
             os.killpg(self._core.pid, signal.SIGKILL)
             self._core.wait()

@@ -193,7 +193,7 @@ def results(folder: Path, *command: str) -> dict[str, Any]:
         env=environ,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -34,6 +34,6 @@ def start(network: Network, script: str, *argv: str, **variables: str) -> Progra
 def run(network: Network, script: str, *argv: str, code: int = 0, **variables: str) -> list[str]:
     """Run a program, and return its lines."""
     program = start(network, script, *argv, **variables)
-    ended = program.exit_code(30)
+    ended = program.exit_code()
     assert ended == code, program.output
     return program.lines

@@ -33,9 +33,9 @@ def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
         impl = subscriber.impl
         print(impl.callbacks, impl.ref_count, impl.queue_size)
         impl.add_callback(take, ["extra"])
-        print(came.wait(10))
+        print(came.wait(60))
         links[0](String("welcome"))
-        print(heard.wait(10), got)
+        print(heard.wait(60), got)
         print(out.impl.has_connections(), out.impl.has_connection("/shared"),
               impl.get_num_connections(), listener in out.impl.subscriber_listeners)
         impl.remove_callback(take, ["extra"])
@@ -44,7 +44,7 @@ def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
         except KeyError as error:
             print("KeyError", error)
         subscriber.unregister()
-        print(went.wait(10), impl.ref_count, impl.closed, subscriber.type, subscriber.name)
+        print(went.wait(60), impl.ref_count, impl.closed, subscriber.type, subscriber.name)
         try:
             impl.add_callback(take, None)
         except rospy.ROSException as error:
@@ -54,7 +54,7 @@ def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
         out.impl.enable_latch()
         out.impl.subscriber_listeners.remove(listener)
         out.publish("kept")
-        print(rospy.wait_for_message("x", String, 10).data, out.impl.latch.data)
+        print(rospy.wait_for_message("x", String, 60).data, out.impl.latch.data)
         """) == [
         "{'a': 'b'} 3 False /x",
         "[] 1 None",
@@ -186,7 +186,7 @@ def test_log_messages_name_the_file_without_its_folder(printed: Printed) -> None
         from rosgraph_msgs.msg import Log
         rospy.init_node("files")
         rospy.loginfo("here")
-        found = rospy.wait_for_message("/rosout", Log, 10)
+        found = rospy.wait_for_message("/rosout", Log, 60)
         print(found.file == os.path.basename(__file__), found.function)
         """)[-1:] == ["True <module>"]
 

@@ -312,7 +312,7 @@ def test_spin_on_another_thread(printed: Printed) -> None:
         thread = threading.Thread(target=rospy.spin)
         thread.start()
         rospy.signal_shutdown("enough")
-        thread.join(10)
+        thread.join(60)
         print(thread.is_alive())
         """) == ["False"]
 

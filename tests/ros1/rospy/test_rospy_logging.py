@@ -116,8 +116,8 @@ def test_levels_set_by_service_and_by_python_logging(printed: Printed) -> None:
             import rospy
             from roscpp.srv import GetLoggers, SetLoggerLevel
             rospy.init_node("logs")
-            rospy.wait_for_service("~set_logger_level", 10)
-            rospy.wait_for_service("~get_loggers", 10)
+            rospy.wait_for_service("~set_logger_level", 60)
+            rospy.wait_for_service("~get_loggers", 60)
             set_level = rospy.ServiceProxy("~set_logger_level", SetLoggerLevel)
             set_level("rosout", "debug")
             rospy.logdebug("shown")

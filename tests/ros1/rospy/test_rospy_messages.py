@@ -40,7 +40,7 @@ def test_programs_derive_classes(printed: Printed) -> None:
         rospy.init_node("derived")
         out = rospy.Publisher("status", DiagnosticStatus, queue_size=1, latch=True)
         out.publish(status)
-        print(rospy.wait_for_message("status", DiagnosticStatus, 10).message)
+        print(rospy.wait_for_message("status", DiagnosticStatus, 60).message)
         """) == [
         "['motor'] motor hot []",
         "['motor'] ['motor']",
@@ -130,8 +130,8 @@ def test_bytes_are_signed(printed: Printed) -> None:
         rospy.init_node("signed")
         out = rospy.Publisher("levels", DiagnosticArray, queue_size=1, latch=True)
         out.publish(DiagnosticArray(status=[DiagnosticStatus(level=-127)]))
-        print(rospy.wait_for_message("levels", DiagnosticArray, 10).status[0].level)
+        print(rospy.wait_for_message("levels", DiagnosticArray, 60).status[0].level)
         out = rospy.Publisher("many", ByteMultiArray, queue_size=1, latch=True)
         out.publish(ByteMultiArray(data=[-1, 2]))
-        print(rospy.wait_for_message("many", ByteMultiArray, 10).data)
+        print(rospy.wait_for_message("many", ByteMultiArray, 60).data)
         """) == ["-127", "(-1, 2)"]

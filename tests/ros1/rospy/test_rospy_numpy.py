@@ -65,5 +65,5 @@ def test_on_a_topic(printed: Printed) -> None:
         out.publish(np.array([1.0, 2.5], dtype=np.float32))
         got = rospy.wait_for_message("floats", numpy_msg(Floats), 10)
         print(type(got.data).__name__, got.data.dtype, got.data.tolist())
-        print(rospy.wait_for_message("floats", Floats, 10).data)
+        print(rospy.wait_for_message("floats", Floats, 60).data)
         """) == ["ndarray float32 [1.0, 2.5]", "(1.0, 2.5)"]

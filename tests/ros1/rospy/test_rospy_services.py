@@ -161,7 +161,7 @@ def test_wait_for_service(printed: Printed) -> None:
     show("late", lambda: rospy.wait_for_service("late"))
     out = rospy.Publisher("x", String, queue_size=1, latch=True)
     out.publish("there")
-    print(rospy.wait_for_message("x", String, timeout=5).data)
+    print(rospy.wait_for_message("x", String, 60).data)
 """) == [
         "none -> ROSException | timeout exceeded while waiting for service /none",
         "duration -> ROSException | timeout exceeded while waiting for service /none",
@@ -191,7 +191,7 @@ def test_calls_between_processes_and_from_handlers(network: Network) -> None:
         """
         import rospy
         from rospy_tutorials.srv import AddTwoInts
-        rospy.wait_for_service("outer", 10)
+        rospy.wait_for_service("outer", 60)
         print(rospy.ServiceProxy("outer", AddTwoInts)(1, 2).sum)
         """,
     ) == ["30"]
@@ -204,7 +204,7 @@ def test_shutdown_ends_a_call(printed: Printed) -> None:
     busy, never = threading.Event(), threading.Event()
     def wait(request):
         busy.set()
-        never.wait(30)
+        never.wait(60)
         return []
     rospy.Service("slow", Empty, wait)
     def end():

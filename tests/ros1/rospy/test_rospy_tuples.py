@@ -109,7 +109,7 @@ def test_on_topics_and_in_services(printed: Printed) -> None:
         rospy.init_node("tuples")
         out = rospy.Publisher("numbers", Float64MultiArray, queue_size=1, latch=True)
         out.publish(data=[1.0, 2.0])
-        n = rospy.wait_for_message("numbers", Float64MultiArray, 10)
+        n = rospy.wait_for_message("numbers", Float64MultiArray, 60)
         print(n.data == (1.0, 2.0), n.data + (3.0,), json.dumps(n.data), len({n.data}))
         taken = []
         def handle(request):

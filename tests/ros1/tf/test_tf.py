@@ -149,7 +149,7 @@ def test_buffers_of_other_nodes(network: Network) -> None:
         from std_msgs.msg import Header
         from tf2_msgs.srv import FrameGraph
         rospy.init_node("client")
-        rospy.wait_for_service("/server/tf2_frames", 15)
+        rospy.wait_for_service("/server/tf2_frames", 60)
         print(rospy.ServiceProxy("/server/tf2_frames", FrameGraph)().frame_yaml.splitlines()[:2])
         buffer = tf2_ros.BufferClient("lookups")
         print(buffer.wait_for_server(rospy.Duration(15)))

@@ -30,7 +30,7 @@ rospy.loginfo("first")
 speak()
 rospy.logwarn("of a part", logger_name="part.wheel")
 rospy.logfatal("last")
-done.wait(10)
+done.wait(60)
 for message in seen:
     print(message.level, message.name, message.msg, message.file.split("/")[-1], message.function, message.line)
 print(Log.DEBUG, Log.INFO, Log.WARN, Log.ERROR, Log.FATAL)

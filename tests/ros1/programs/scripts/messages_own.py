@@ -51,7 +51,7 @@ message.since = rospy.Time(1, 2)
 message.rest = rospy.Duration(-0.5)
 message.tags = [b"a"[0], 2]
 publisher.publish(message)
-done.wait(10)
+done.wait(60)
 for bad in (Herd(corners=[1]), Herd(tags=[300])):
     try:
         publisher.publish(bad)

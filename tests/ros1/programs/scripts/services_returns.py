@@ -10,7 +10,7 @@ rospy.init_node("server")
 def attempt(what, kind, handler):
     name = "ask_" + what.replace(" ", "_")
     service = rospy.Service(name, kind, handler)
-    rospy.wait_for_service(name, 10)
+    rospy.wait_for_service(name, 60)
     try:
         print(what, "->", str(rospy.ServiceProxy(name, kind)()).replace("\n", ", "))
     except Exception as error:

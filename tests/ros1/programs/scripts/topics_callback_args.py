@@ -40,5 +40,5 @@ while publisher.get_num_connections() < 1:
     rospy.sleep(0.01)
 for number in (1, 2, 3):
     publisher.publish(number)
-done.wait(10)
+done.wait(60)
 print("\n".join(lines))

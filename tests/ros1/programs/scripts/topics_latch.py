@@ -10,8 +10,8 @@ plain = rospy.Publisher("scan", String, queue_size=1)
 for text in ("first", "second", "third"):
     latched.publish(text)
     plain.publish(text)
-print(rospy.wait_for_message("map", String, timeout=10).data)
-print(rospy.wait_for_message("map", String, timeout=10).data)
+print(rospy.wait_for_message("map", String, 60).data)
+print(rospy.wait_for_message("map", String, 60).data)
 try:
     rospy.wait_for_message("scan", String, timeout=0.3)
 except rospy.ROSException as error:

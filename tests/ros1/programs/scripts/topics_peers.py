@@ -34,9 +34,9 @@ def callback(message):
 
 
 guest = rospy.Subscriber("party", String, callback)
-came.wait(10)
-both.wait(10)
+came.wait(60)
+both.wait(60)
 print(sorted(texts), publisher.get_num_connections(), guest.get_num_connections())
 guest.unregister()
-went.wait(10)
+went.wait(60)
 print("after", publisher.get_num_connections())

@@ -16,7 +16,7 @@ def run(size):
         seen.append(message.data)
         if message.data == 0:
             started.set()
-            go.wait(10)
+            go.wait(60)
 
     topic = "numbers_%s" % size
     subscriber = rospy.Subscriber(topic, Int32, callback, queue_size=size)
@@ -24,7 +24,7 @@ def run(size):
     while publisher.get_num_connections() < 1:
         rospy.sleep(0.01)
     publisher.publish(0)
-    started.wait(10)
+    started.wait(60)
     for number in range(1, 11):
         publisher.publish(number)
     rospy.sleep(0.3)

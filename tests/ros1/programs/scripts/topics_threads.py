@@ -13,7 +13,7 @@ lines = []
 
 
 def callback(message, name):
-    lines.append("met" if meeting.wait(10) in (0, 1) else "never")
+    lines.append("met" if meeting.wait(60) in (0, 1) else "never")
     with lock:
         if len(lines) == 4:
             rospy.signal_shutdown("met twice")

@@ -13,6 +13,6 @@ for timeout in (0.1, 1e-9):
 timer = rospy.Timer(rospy.Duration(0.02), lambda event: publisher.publish(7))
 publisher = rospy.Publisher("sevens", Int32, queue_size=1)
 print(rospy.wait_for_message("sevens", Int32).data)
-print(rospy.wait_for_message("/sevens", Int32, timeout=10))
+print(rospy.wait_for_message("/sevens", Int32, 60))
 print(rospy.wait_for_message("sevens", Int32, rospy.Duration(10).to_sec()).data)
 timer.shutdown()

@@ -167,7 +167,7 @@ with top:
     with within:
         smach.StateMachine.add(
             "LAST",
-            smach.CBState(lambda ud: here.wait(30) and "done", outcomes=["done"]),
+            smach.CBState(lambda ud: here.wait(60) and "done", outcomes=["done"]),
         )
 statuses, structures = {}, {}
 
