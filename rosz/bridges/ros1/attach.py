@@ -120,7 +120,7 @@ class AttachedBridge:
         context = shared.context
         server = self._lifecycle.keep(Server(shared.loop, host, 0))
         self._uri = f"http://{host}:{server.port}/"
-        self._service_uri = f"rosrpc://{host}:{server.port}"
+        self._service_uri = _service_uri(self._uri)
         machine = re.sub(r"\W", "_", socket.gethostname(), flags=re.ASCII)
         shared.name = f"{BRIDGE}{machine}_{server.port}"
         self._own = self._lifecycle.keep(BridgedNode(context, shared.name, lambda _reason: None))
@@ -195,11 +195,8 @@ class AttachedBridge:
                 ("getParam", (name, _RUN_ID)),
             ],
         )
-        try:
-            nodes = tuple(map(dict, msgspec.convert(state, tuple[_Names, _Names, _Names])))
-            kinds = dict(msgspec.convert(types, list[tuple[str, str]]))
-        except msgspec.ValidationError as error:
-            raise DecodeError("state of the master", -1, str(error)) from error
+        nodes = _read_state(state)
+        kinds = dict(_convert(types, list[tuple[str, str]]))
         self._check_master()
         self._active = self._is_first()
         if not self._active:
@@ -207,7 +204,7 @@ class AttachedBridge:
             self._apply(set())
             return
         self._apply(self._read(nodes, kinds))
-        self._register(nodes)
+        self._register(self._without_ended(nodes))
         if run_id != self._run_id:
             self._join_params()
             self._run_id = run_id
@@ -255,7 +252,8 @@ class AttachedBridge:
             for node in nodes
             if not node.startswith(BRIDGE)
         ]
-        nodes = sorted({node for _, _, node in found})
+        bridges = {n for known in state for nodes in known.values() for n in nodes if _is_bridge(n)}
+        nodes = sorted({node for _, _, node in found} | bridges)
         services = sorted({name for role, name, _ in found if role == "service"})
         own = self._shared.name
         uris = multicall(
@@ -265,8 +263,11 @@ class AttachedBridge:
         )
         of_node = dict(zip(nodes, uris, strict=False))
         of_service = dict(zip(services, uris[len(nodes) :], strict=False))
+        before = self._uris.items()
         self._uris = {node: self._reachable(uri) for node, uri in of_node.items() if uri}
         self._ended &= self._uris.items()
+        for node, uri in self._uris.items() - before:
+            self._shared.prober.check(node, uri)
         return {
             Entry(
                 role,
@@ -343,19 +344,39 @@ class AttachedBridge:
 
     def _leave(self) -> None:
         """Unregister everything."""
+        own = self._shared.name
         try:
-            own = self._shared.name
-            (state,) = multicall(self._master, [("getSystemState", (own,))])
-            published, _, served = state
-            for topic, nodes in published:
-                if own in nodes:
-                    self._call("unregisterPublisher", topic, self._uri)
-            for service, nodes in served:
-                if own in nodes:
-                    self._call("unregisterService", service, self._service_uri)
-            self._call("unsubscribeParam", self._uri, "/")
+            self._unregister_all(own, self._uri, _read_state(self._call("getSystemState")))
         except RoszError as error:
             log.debug("the master has gone: %s", error)
+
+    def _without_ended(self, state: _State) -> _State:
+        """Return a state without bridges of this machine that were killed; unregister them."""
+        host = Address.parse(self._uri).host
+        ended = {
+            node: uri
+            for node, uri in self._ended
+            if _is_bridge(node) and Address.parse(uri).host == host
+        }
+        for node, uri in ended.items():
+            self._unregister_all(node, uri, state)
+        return tuple(
+            {
+                name: found
+                for name, nodes in known.items()
+                if (found := [*set(nodes) - ended.keys()])
+            }
+            for known in state
+        )
+
+    def _unregister_all(self, node: str, uri: str, state: _State) -> None:
+        """Unregister everything of a bridge."""
+        published, _, served = state
+        for topic in (name for name, nodes in published.items() if node in nodes):
+            call(self._master, "unregisterPublisher", (node, topic, uri))
+        for service in (name for name, nodes in served.items() if node in nodes):
+            call(self._master, "unregisterService", (node, service, _service_uri(uri)))
+        call(self._master, "unsubscribeParam", (node, uri, "/"))
 
     # Parameters.
 
@@ -416,6 +437,31 @@ class AttachedBridge:
             return
         except RoszError as error:
             log.warning("parameter '%s' of ROS 1 is not set here: %s", name, error)
+
+
+def _read_state(state: Any) -> _State:
+    """Return the state that a master has told.
+
+    Raises:
+        DecodeError: It is not one.
+    """
+    return tuple(map(dict, _convert(state, tuple[_Names, _Names, _Names])))
+
+
+def _convert(value: Any, kind: Any) -> Any:
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise DecodeError("state of the master", -1, str(error)) from error
+
+
+def _service_uri(uri: str) -> str:
+    """Return the URI of the services of a bridge, which has one port for all."""
+    return uri.replace("http:", "rosrpc:").rstrip("/")
+
+
+def _is_bridge(node: str) -> bool:
+    return node.startswith(BRIDGE)
 
 
 def _flat(tree: dict[str, Any]) -> Iterable[tuple[str, Any]]:

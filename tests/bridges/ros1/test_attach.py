@@ -142,6 +142,34 @@ def test_a_killed_node_goes_from_the_network(robot: Robot, node: Node) -> None:
             assert "/rospy_server" in robot.run("rosnode", "list").split()
 
 
+def test_what_a_killed_bridge_served_is_served_again(robot: Robot, node: Node) -> None:
+    """By another bridge that has waited, or by the next one; the master would keep the old."""
+    node.service("/of_rosz_service", SetBool, lambda _request: [True, "from rosz"])
+    node.publisher("/of_rosz_topic", String)
+
+    def start() -> Program:
+        uri = f"http://127.0.0.1:{robot.port}"
+        program = robot.network.run("-m", "rosz", "bridge", "ros1", "--master", uri)
+        program.wait_for("started the bridge")
+        return program
+
+    def served() -> bool:
+        return "from rosz" in robot.run("rosservice", "call", "/of_rosz_service", "true")
+
+    bridges = [start(), start()]
+    eventually(served)
+    for bridge in bridges:
+        bridge.kill()
+    assert not served()
+    bridges = [start(), start()]
+    eventually(served)
+    bridges[0].kill()
+    eventually(served)
+    eventually(lambda: robot.run("rostopic", "info", "/of_rosz_topic").count("/ros1_bridge") == 1)
+    bridges[1].send(signal.SIGINT)
+    bridges[1].exit_code()
+
+
 def test_the_bridge_is_back_after_the_master(robot: Robot, node: Node) -> None:
     publisher = node.publisher("/staying", String, latch=True)
     publisher.publish("back")
