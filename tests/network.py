@@ -24,11 +24,21 @@ from rosz.environment import Environment
 from rosz.node import Context, Node
 from rosz.session import Session, SessionConfig
 
-__all__ = ("TIMEOUT", "WHOLE_LINES", "Network", "Program", "eventually", "free_port", "repeats")
+__all__ = (
+    "TIMEOUT",
+    "WHOLE_LINES",
+    "WITHOUT_LIMITS",
+    "Network",
+    "Program",
+    "eventually",
+    "free_port",
+    "repeats",
+)
 
-TIMEOUT = 60.0
+TIMEOUT = 50.0
 """Seconds after which something that should happen at once counts as never happening: a machine
-that runs a hundred other programs may take a minute to start one."""
+that runs a hundred other programs may take half a minute to start one. After 60 s, sessions give up
+silent links and calls their servers, which therefore counts as never, too."""
 
 T = TypeVar("T", bound="Any")
 _ROOT = Path(__file__).parent.parent
@@ -37,6 +47,18 @@ WHOLE_LINES = (
     "write(' '.join(map(str, words)) + end, end='', flush=flush)\n"
 )
 """What keeps the lines of several threads of a program apart."""
+WITHOUT_LIMITS = """
+    import atexit
+    from rosz import lifecycle, worker
+    from rosz.node import log_handlers
+    from rosz.session import at_exit
+
+    atexit.unregister(at_exit.wait_for_calls)
+    atexit.register(at_exit.wait_for_calls, 1e4)
+    lifecycle._CLOSE_TIMEOUT = log_handlers._DRAIN_TIMEOUT = 1e4
+    worker.Worker.close.__defaults__ = (1e4,)
+"""
+"""What has a program hang that would end only because its end gives up waiting for something."""
 
 
 def repeats(usual: int, full: int) -> int:

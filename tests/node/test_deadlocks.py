@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import faulthandler
 import threading
-import time
 from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any
@@ -12,10 +11,12 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network, repeats
 
+from rosz import lifecycle
 from rosz.errors import ClosedError, RoszError
 from rosz.msgs.example_interfaces.srv import AddTwoInts, AddTwoIntsRequest
 from rosz.msgs.std_msgs.msg import Int32
 from rosz.node import Node
+from rosz.worker import Worker
 
 WATCHDOG = TIMEOUT
 ROUNDS = repeats(4, 50)
@@ -212,16 +213,14 @@ def callback_sleeps(it: Subject) -> None:
 
     def callback(_message: Int32) -> None:
         asleep.set()
-        it.node.sleep(WATCHDOG)
+        it.node.sleep(1000)
 
     it.node.subscription("sleep", Int32, callback)
     it.node.subscription("sleep", Int32, lambda m: it.got.put(ask(m.data)))
     it.publish("sleep", 3)
     assert asleep.wait(WATCHDOG)
     assert it.wait() == [6]
-    began = time.monotonic()
     it.node.context.close()
-    assert time.monotonic() - began < 2
 
 
 def hook_publishes_and_calls(it: Subject) -> None:
@@ -274,7 +273,15 @@ def watched(scene: Callable[[Subject], None], node: Node) -> None:
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("partner", ["same session", "other session", "other process"])
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: str(scene.__name__))
-def test_no_call_hangs(network: Network, scene: Callable[[Subject], None], partner: str) -> None:
+def test_no_call_hangs(
+    network: Network,
+    monkeypatch: pytest.MonkeyPatch,
+    scene: Callable[[Subject], None],
+    partner: str,
+) -> None:
+    """Nor does a scene end only because something gives up waiting."""
+    monkeypatch.setattr(lifecycle, "_CLOSE_TIMEOUT", 1000.0)
+    monkeypatch.setattr(Worker.close, "__defaults__", (1000.0,))
     if partner == "other process":
         network.program(PARTNER).wait_for("ready", TIMEOUT)
     elif partner == "other session":

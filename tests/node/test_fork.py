@@ -142,12 +142,12 @@ def test_a_child_with_a_node_of_its_own(network: Network) -> None:
         from rosz.msgs.std_msgs.msg import String
         if child:
             with rosz.Node("parent") as node:
-                print("heard", node.subscription("chatter", String).get(15).data, flush=True)
+                print("heard", node.subscription("chatter", String).get(50).data, flush=True)
             assert os.waitpid(child, 0)[1] == 0
         else:
             with rosz.Node("child") as node:
                 publisher = node.publisher("chatter", String)
-                publisher.wait_for_subscribers(timeout=15)
+                publisher.wait_for_subscribers(timeout=50)
                 publisher.publish("hello")
         """
     )

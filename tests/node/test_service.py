@@ -205,11 +205,12 @@ def threads_for(name: str) -> list[str]:
 
 
 def test_threads_end_with_the_service(server: Node) -> None:
-    service = server.service("add", AddTwoInts, lambda _: 0)
-    client = server.client("add", AddTwoInts)
+    name = "total"  # not in the id of any session, which is hexadecimal
+    service = server.service(name, AddTwoInts, lambda _: 0)
+    client = server.client(name, AddTwoInts)
     client.wait_for_service()
     client(0, 0)
-    assert len(threads_for("add")) > 1
+    assert len(threads_for(name)) > 1
     client.close()  # it follows the servers
     service.close()
-    eventually(lambda: not threads_for("add"), "its threads ended")
+    eventually(lambda: not threads_for(name), "its threads ended")

@@ -6,7 +6,7 @@ import signal
 import time
 
 import pytest
-from network import Network, Program
+from network import WITHOUT_LIMITS, Network, Program
 
 from rosz.node import signals
 
@@ -44,12 +44,10 @@ WAITS = {
 def test_polite_programs_end_by_themselves(
     network: Network, wait: str, number: signal.Signals
 ) -> None:
-    program = network.program(POLITE.format(wait=wait))
+    program = network.program(WITHOUT_LIMITS + POLITE.format(wait=wait))
     program.wait_for("ready")
-    began = time.monotonic()
     program.send(number)
     assert program.exit_code() == 0, program.output
-    assert time.monotonic() - began < 3
     assert program.lines == ["ready", f"hook: {number.name}", "done"]
 
 

@@ -118,7 +118,7 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
     monkeypatch.setattr(takeover, "_is_newer", slowly)
     king = network.node("king")
     elsewhere = network.context()
-    before, ended = threading.active_count(), takeovers()
+    ended = takeovers()
     duplicates = [
         ProcessToken(king.context.domain, elsewhere.session.zid, number, 1, 7, "afar", "/king")
         for number in range(50)
@@ -127,7 +127,6 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
     seen = [asked.get(timeout=TIMEOUT) for _ in range(takeover._THREADS)]
     network.node("last")
     king.context.graph.wait_for_node("/last", TIMEOUT)
-    assert threading.active_count() - before < len(duplicates)
     assert len(takeovers() - ended) == takeover._THREADS
     go_on.set()
     seen += [asked.get(timeout=TIMEOUT) for _ in range(len(duplicates) - len(seen))]
