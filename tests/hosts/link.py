@@ -136,5 +136,5 @@ class Link:
         assert wire.stdin is not None
         assert wire.stdout is not None
         wire.stdin.close()
-        wire.wait(30)
+        wire.wait(60)
         wire.stdout.close()

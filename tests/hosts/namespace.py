@@ -13,7 +13,7 @@ import pytest
 
 __all__ = ("Namespace", "children", "why_not")
 
-_TIMEOUT = 30.0
+_TIMEOUT = 100.0
 _ENTER = {"-n": "--net", "-u": "--uts", "-m": "--mount", "-p": "--pid", "-i": "--ipc"}
 
 

@@ -23,14 +23,14 @@ def dialling(laptop: Host) -> HostProgram:
 def linked(robot: Host, core: HostProgram) -> None:
     """Start the other core, and wait until there is a link."""
     robot.rosz("core", "--listen", LISTEN).wait_for("started core")
-    core.wait_for(f"connected to {ROBOT}", 30)
+    core.wait_for(f"connected to {ROBOT}", 60)
 
 
 def test_a_core_that_refuses_at_first(world: World) -> None:
     robot, laptop = world.hosts("robot", "laptop")
     linked(robot, dialling(laptop))
     robot.program(TALKER).wait_for("talking")
-    laptop.program(LISTENER, "listener", "once").wait_for("heard", 30)
+    laptop.program(LISTENER, "listener", "once").wait_for("heard", 60)
 
 
 @pytest.mark.parametrize("seconds", [repeats(2, 30)])
@@ -49,9 +49,9 @@ def test_a_link_that_is_lost_is_told(world: World) -> None:
     robot_core = robot.rosz("core", "--listen", LISTEN)
     robot_core.wait_for("started core")
     core = laptop.rosz("core", "--connect", ROBOT)
-    core.wait_for(f"connected to {ROBOT}", 30)
+    core.wait_for(f"connected to {ROBOT}", 60)
     robot_core.kill()
-    core.wait_for(f"the link to {ROBOT} is lost: waiting for it", 30)
+    core.wait_for(f"the link to {ROBOT} is lost: waiting for it", 60)
     linked(robot, core)
 
 
@@ -62,4 +62,4 @@ def test_a_node_that_dials_first(world: World, listen: str) -> None:
     listener.wait_for(f"waiting for {ROBOT}")
     robot.rosz("core", "--listen", LISTEN).wait_for("started core")
     robot.program(TALKER).wait_for("talking")
-    listener.wait_for("heard", 30)
+    listener.wait_for("heard", 60)

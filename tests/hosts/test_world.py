@@ -94,10 +94,9 @@ def test_a_bad_link_delays_and_loses(world: World) -> None:
         client.say("")
         return float(client.wait_for("echo", after=count).split()[1])
 
-    slow = min(echo() for _ in range(3))
-    assert 0.2 <= slow < 1
+    assert min(echo() for _ in range(3)) >= 0.2
     other.link.heal()
-    assert min(echo() for _ in range(3)) < 0.1
+    eventually(lambda: echo() < 0.2, "an echo without delay")
     other.link.degrade(loss=1)
     assert not reaches(one, "other", 0.3)
     other.link.heal()

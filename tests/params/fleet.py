@@ -53,7 +53,7 @@ class Process(Program):
     def tell(self, verb: str, **arguments: Any) -> None:
         self.say(json.dumps([verb, arguments]))
 
-    def answer(self, timeout: float = TIMEOUT) -> Any:
+    def answer(self, timeout: float = 4 * TIMEOUT) -> Any:
         answered = self.wait_until(lambda: len(self.lines) > self._answered, timeout)
         assert answered, f"no answer within {timeout} s, or the member ended:\n{self.errors}"
         self._answered += 1

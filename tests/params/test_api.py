@@ -6,6 +6,7 @@ import timeit
 from queue import SimpleQueue
 
 import pytest
+from network import TIMEOUT
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
 from rosz.params.api import Params
@@ -121,12 +122,12 @@ def test_watching(params: Params) -> None:
     heard: SimpleQueue[Changed] = SimpleQueue()
     with params.watch("~gain", heard.put):
         params["~gain"] = 2
-        change = heard.get(timeout=10)
+        change = heard.get(timeout=TIMEOUT)
         assert (change.name, change.old, change.new) == ("/ns/node/gain", None, 2)
         assert change.origin == "/ns/node (talker.py)"
         assert not change.deleted
         del params["~gain"]
-        assert heard.get(timeout=10).deleted
+        assert heard.get(timeout=TIMEOUT).deleted
 
 
 def test_what_is_read_is_the_readers_own(params: Params) -> None:
@@ -161,8 +162,8 @@ def test_names_made_up_for_ever_cost_no_memory(params: Params) -> None:
 
 def test_a_read_takes_less_than_a_microsecond(params: Params) -> None:
     params["~gain"] = 1.5
-    best = min(timeit.repeat(lambda: params["~gain"], number=10_000, repeat=7)) / 10_000
-    assert best < 1e-6
+    timer = timeit.Timer(lambda: params["~gain"], timer=time.thread_time)
+    assert min(timer.repeat(number=10_000, repeat=7)) / 10_000 < 1e-6
 
 
 def test_reads_go_on_while_a_set_waits(network: Network, params: Params) -> None:
@@ -174,6 +175,6 @@ def test_reads_go_on_while_a_set_waits(network: Network, params: Params) -> None
     begun = time.monotonic()
     thread.start()
     while params["a"] == 1:
-        assert time.monotonic() - begun < 10
+        assert time.monotonic() - begun < TIMEOUT
     assert params["a"] == 2
     thread.join()

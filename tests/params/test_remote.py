@@ -2,13 +2,12 @@ from __future__ import annotations
 
 import datetime as dt
 import threading
-import time
 from collections.abc import Iterable
 from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import eventually
+from network import TIMEOUT, eventually
 
 from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
 from rosz.params.remote import ParamClient
@@ -86,11 +85,11 @@ def test_nobody_there_is_said_with_what_to_start(network: Network) -> None:
 def test_a_replica_that_does_not_answer_is_passed_over(network: Network) -> None:
     Mute(network)
     replica = network.replica()
-    client = ParamClient(network.command(), timeout=10)
-    begun = time.monotonic()
+    client = ParamClient(network.command(), timeout=1000)
     replica.set("/a", 1, timeout=0.1)
-    assert client.get("/a") == 1
-    assert time.monotonic() - begun < 3
+    got: SimpleQueue[Any] = SimpleQueue()
+    network.thread(lambda: got.put(client.get("/a")))
+    assert got.get(timeout=TIMEOUT) == 1
 
 
 def test_a_write_waits_once_for_one_that_does_not_answer(
@@ -160,11 +159,11 @@ def test_following_without_being_one(network: Network) -> None:
         assert follower.get("/a") == 1
         follower.watch("/a", heard.put)
         client.set("/a", 2)
-        change = heard.get(timeout=10)
+        change = heard.get(timeout=TIMEOUT)
         assert (change.name, change.old, change.new, change.origin) == ("/a", 1, 2, "a command")
         for replica in replicas:
             replica.set("/a", replica.label)
-            assert heard.get(timeout=10).new == replica.label
+            assert heard.get(timeout=TIMEOUT).new == replica.label
         assert all(len(replica.members()) == 1 for replica in replicas)
     follower.close()
 

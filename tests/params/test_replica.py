@@ -5,12 +5,13 @@ import re
 import threading
 import time
 from collections.abc import Collection
+from queue import SimpleQueue
 
 import pytest
 from network import TIMEOUT, eventually
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
-from rosz.params.replica import Replica
+from rosz.params.replica import Outcome, Replica
 from rosz.params.replica.broadcast import Delivery, PendingWrite
 from rosz.params.wire import (
     Batch,
@@ -68,9 +69,7 @@ def test_nobody_waits_for_one_that_ends_as_it_is_counted(
         return count(zids)
 
     monkeypatch.setattr(first._broadcaster.pending, "open", too_late)
-    begun = time.monotonic()
-    assert first.set("/a", 1, timeout=10).slow == ()
-    assert time.monotonic() - begun < 5
+    assert first.set("/a", 1, timeout=TIMEOUT).slow == ()
     assert not first._broadcaster.pending._lagging
 
 
@@ -85,10 +84,20 @@ def test_a_newcomer_has_everything(network: Network) -> None:
     assert later.origin("/a/b") == first.label
 
 
+@pytest.fixture
+def patient_joining(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a replica that joins wait for ever for what does not come."""
+    monkeypatch.setattr("rosz.params.replica.replica._MESH_TIMEOUT", 1e4)
+    monkeypatch.setattr("rosz.params.replica.replica._TOKENS_TIMEOUT", 1e4)
+    monkeypatch.setattr("rosz.params.replica.sync._JOIN_TIMEOUT", 1e4)
+    monkeypatch.setattr("rosz.params.replica.sync._TIMEOUT", 1e4)
+
+
+@pytest.mark.usefixtures("patient_joining")
 def test_a_newcomer_with_nobody_there_starts_empty_at_once(network: Network) -> None:
-    begun = time.monotonic()
-    assert network.replica().root == {}
-    assert time.monotonic() - begun < 1
+    joined: SimpleQueue[Replica] = SimpleQueue()
+    network.thread(lambda: joined.put(network.replica()))
+    assert joined.get(timeout=TIMEOUT).root == {}
 
 
 def test_domains_do_not_see_each_other(network: Network) -> None:
@@ -268,10 +277,10 @@ def test_a_batch_is_one_change_for_every_reader(network: Network) -> None:
 def test_large_values_arrive_whole(network: Network) -> None:
     one, other = network.replicas(2)
     text = "x" * 10_000_000
-    assert one.set("/text", text, timeout=20).slow == ()
+    assert one.set("/text", text, timeout=TIMEOUT).slow == ()
     assert other.get("/text") == text
     many = {f"ns{number % 100}/p{number}": number for number in range(20_000)}
-    assert merge(one, "/many", many, timeout=20).slow == ()
+    assert merge(one, "/many", many, timeout=TIMEOUT).slow == ()
     assert len(other.names()) == 20_001
     assert other.digest() == one.digest()
 
@@ -280,7 +289,7 @@ def test_readers_do_not_wait_for_large_loads(network: Network) -> None:
     one, other = network.replicas(2)
     one.set("/rate", 5)
     many = {f"p{number}": number for number in range(20_000)}
-    thread = threading.Thread(target=lambda: merge(one, "/many", many, timeout=20))
+    thread = threading.Thread(target=lambda: merge(one, "/many", many, timeout=TIMEOUT))
     thread.start()
     reads = 0
     while thread.is_alive():
@@ -324,7 +333,7 @@ def test_a_replica_that_does_not_answer_is_named_once_and_then_not_waited_for(
     begun = time.monotonic()
     with caplog.at_level(logging.WARNING, "rosz.params"):
         outcome = one.set("/a/b", 1, timeout=0.4)
-    assert 0.3 < time.monotonic() - begun < 2
+    assert time.monotonic() - begun > 0.3
     assert outcome.slow == ("mute program (pid 7 on elsewhere)",)
     (warning,) = caplog.records
     assert re.fullmatch(
@@ -333,9 +342,9 @@ def test_a_replica_that_does_not_answer_is_named_once_and_then_not_waited_for(
         warning.getMessage(),
     )
     assert other.get("/a/b") == 1
-    begun = time.monotonic()
-    assert one.set("/a/b", 2, timeout=5).slow == outcome.slow
-    assert time.monotonic() - begun < 1
+    again: SimpleQueue[Outcome] = SimpleQueue()
+    network.thread(lambda: again.put(one.set("/a/b", 2, timeout=1000)))
+    assert again.get(timeout=TIMEOUT).slow == outcome.slow
     assert caplog.text.count("not yet known") == 1
 
 
@@ -360,26 +369,24 @@ def test_a_replica_that_goes_is_not_waited_for(network: Network) -> None:
     eventually(lambda: len(one.members()) == 1)
     timer = threading.Timer(0.2, mute.token.close)
     timer.start()
-    begun = time.monotonic()
-    assert one.set("/a", 1, timeout=8).slow == ()
-    assert time.monotonic() - begun < 4
+    assert one.set("/a", 1, timeout=TIMEOUT).slow == ()
     timer.join()
 
 
+@pytest.mark.usefixtures("patient_joining")
 def test_joining_does_not_hang_on_a_replica_that_is_mute(network: Network) -> None:
     Mute(network)
     first = network.replica()
     first.set("/a", 1, timeout=0.1)
-    begun = time.monotonic()
-    second = network.replica()
-    assert time.monotonic() - begun < 4
-    assert second.get("/a") == 1
+    joined: SimpleQueue[Replica] = SimpleQueue()
+    network.thread(lambda: joined.put(network.replica()))
+    assert joined.get(timeout=TIMEOUT).get("/a") == 1
 
 
 def test_a_write_that_got_lost_is_told_once_more(network: Network) -> None:
     one, deaf = network.replicas(2)
     deaf._broadcaster._declared[0].close()
-    assert one.set("/a", 1, timeout=5).slow == ()
+    assert one.set("/a", 1, timeout=TIMEOUT).slow == ()
     assert deaf.get("/a") == 1
 
 
@@ -393,10 +400,10 @@ def test_what_was_missed_is_found_by_comparing(network: Network) -> None:
     one.delete("/old", timeout=0)
     deaf.set("/only", "here", timeout=0)
     assert deaf.root == {"old": 1, "only": "here"}
-    assert deaf.compare(5)
+    assert deaf.compare(TIMEOUT)
     assert deaf.root == one.root == {"n": {str(n): n for n in range(300)}, "only": "here"}
     assert deaf.digest() == one.digest()
-    assert one.compare(5)
+    assert one.compare(TIMEOUT)
 
 
 def test_those_that_meet_again_compare_unasked(network: Network) -> None:

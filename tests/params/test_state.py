@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from network import TIMEOUT
 
 from rosz.errors import DecodeError, ParamError
 from rosz.params.replica.state import State
@@ -83,14 +84,14 @@ def test_a_read_waits_for_the_one_that_is_under_way(monkeypatch: pytest.MonkeyPa
 
     def slowly(writes: list[Write]) -> list[Write]:
         entered.set()
-        assert release.wait(10)
+        assert release.wait(TIMEOUT)
         return apply(writes)
 
     monkeypatch.setattr(shared._history, "apply", slowly)
     shared.defer(message("a", 1, 1))
     first = threading.Thread(target=shared.apply_deferred)
     first.start()
-    assert entered.wait(10)
+    assert entered.wait(TIMEOUT)
     seen: list[dict[str, Any]] = []
     second = threading.Thread(target=lambda: seen.append(shared.root))
     second.start()
@@ -128,12 +129,12 @@ def test_taking_does_not_wait_for_others() -> None:
     def work() -> None:
         shared.acquire()
         entered.set()
-        assert release.wait(10)
+        assert release.wait(TIMEOUT)
         shared.release()
 
     other = threading.Thread(target=work)
     other.start()
-    assert entered.wait(10)
+    assert entered.wait(TIMEOUT)
     assert shared.try_receive(message("a", 1, 1)) is None
     release.set()
     other.join()
@@ -287,7 +288,7 @@ def test_a_signal_handler_in_the_midst_of_work_reads_what_was_and_is_refused_the
     monkeypatch.setattr(shared._history, "apply", interrupted)
     writer = threading.Thread(target=lambda: shared.write([(("a",), 2)], "me"), daemon=True)
     writer.start()
-    writer.join(10)
+    writer.join(TIMEOUT)
     assert not writer.is_alive(), "the handler waits for the thread that it interrupted"
     monkeypatch.undo()
     assert seen == [{"a": 1}]

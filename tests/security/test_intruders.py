@@ -144,7 +144,7 @@ def test_a_key_that_expires_meanwhile(hosts: tuple[Host, Host], authority: Autho
     robot.program(VICTIM).wait_for("up")
     intruder = laptop.program(INTRUDER)
     intruder.wait_for("heard")
-    eventually(lambda: nodes_seen_by(robot) == ["/victim"], "the end of the link", 30)
+    eventually(lambda: nodes_seen_by(robot) == ["/victim"], "the end of the link", 60)
     eventually(lambda: nodes_seen_by(laptop) == ["/intruder"], "the end of the link")
     heard = intruder.output.count("heard")
     intruder.wait_for("pin", after=len(intruder.lines) + 20)

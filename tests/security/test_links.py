@@ -152,7 +152,7 @@ def test_rules_allow_only_what_they_say(pair: Pair) -> None:
     laptop.say("set /gains/p 7")
     robot.wait_for("param /gains/p 7")
     laptop.say("set /secrets/pin 0")
-    laptop.wait_for("done set /secrets/pin", 30)
+    laptop.wait_for("done set /secrets/pin", 60)
     assert pair.robot.ask("param", "get", "/secrets/pin") == "vault-4711"
     laptop.say("names")
     assert laptop.wait_for("robot has") == "robot has /cmd_vel /map /odom /reset"

@@ -103,7 +103,7 @@ def test_forbidden_declarations_are_logged(world: World, authority: Authority) -
     assert len(told) == len(named)
     assert all(f"{authority.folder}/rules.yaml" in line and "'laptop'" in line for line in told)
     refused = laptop.rosz("topic", "pub", "-1", "/lift", "std_msgs/String", "data: hello")
-    refused.wait_for("the publisher of '/lift' reaches no other machine", 30)
+    refused.wait_for("the publisher of '/lift' reaches no other machine", 60)
 
 
 FORBIDDEN = [("publisher", "/lift"), ("subscription", "/plan"), ("service", "/lamp")]
@@ -111,5 +111,5 @@ FORBIDDEN = [("publisher", "/lift"), ("subscription", "/plan"), ("service", "/la
 
 def _declarations(host: Host) -> list[str]:
     program = host.program(DECLARER)
-    program.wait_for("up", 30)
+    program.wait_for("up", 60)
     return [line for line in program.lines if "reaches no other machine" in line]

@@ -32,7 +32,7 @@ STOLEN = """
     with rosz.Node("stolen") as node:
         out = node.publisher("cmd_vel", String)
         hear = node.subscription("odom", String)
-        hear.get(timeout=30)
+        hear.get(timeout=60)
         print("heard odom", flush=True)
         for order in sys.stdin:
             out.publish(order.strip())

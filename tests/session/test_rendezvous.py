@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import socket
 import threading
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -83,7 +82,7 @@ def test_many_at_once(place: Network) -> None:
     for name, program in zip(names, programs, strict=True):
         for other in names:
             if other != name:
-                program.wait_for(f"heard {other}", 30)
+                program.wait_for(f"heard {other}")
 
 
 def test_a_router_takes_the_place(place: Network) -> None:
@@ -118,10 +117,8 @@ def test_client_without_a_router(place: Network, monkeypatch: pytest.MonkeyPatch
 
 
 def test_command_finds_nobody(place: Network) -> None:
-    began = time.monotonic()
-    with pytest.raises(TransportError, match="nobody answers at"):
+    with pytest.raises(TransportError, match=r"nobody answers at .* within 0\.2 s"):
         Session.open(SessionConfig.command(place.environment(), timeout=0.2))
-    assert time.monotonic() - began < 3
 
 
 def test_command_sees_all_at_once(place: Network) -> None:
@@ -213,16 +210,16 @@ def test_a_client_waits_for_another_machine(network: Network) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
         early = network.program(PEER, "early", ROSZ_CONNECT=endpoint)
-        early.wait_for(f"waiting for {endpoint}", 30)
+        early.wait_for(f"waiting for {endpoint}")
     with Session.open(SessionConfig(mode="router", rendezvous=endpoint)):
-        early.wait_for(f"connected to {endpoint}", 30)
+        early.wait_for(f"connected to {endpoint}")
         early.wait_for("ready")
 
 
 def test_ctrl_c_ends_a_client_that_waits(network: Network) -> None:
     nobody = f"tcp/127.0.0.1:{free_port()}"
     early = network.program(PEER, "early", ROSZ_CONNECT=nobody)
-    early.wait_for(f"waiting for {nobody}", 30)
+    early.wait_for(f"waiting for {nobody}")
     early.send(signal.SIGINT)
-    assert early.exit_code(30) == -signal.SIGINT
+    assert early.exit_code() == -signal.SIGINT
     assert "Traceback" not in early.output
