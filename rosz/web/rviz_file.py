@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from rosz.errors import UsageError
-from rosz.web.scene import GRID, ROBOT, TF, Look, Setup
+from rosz.errors import RoszError, UsageError
+from rosz.web.scene import DESCRIPTION, GRID, ROBOT, TF, Look, Setup
 
 __all__ = ("read_rviz",)
 
 _TOPIC = "Topic"
 _TOPICS = {
+    "Camera": "Image Topic",
+    "GridCells": _TOPIC,
+    "Image": "Image Topic",
     "LaserScan": _TOPIC,
     "Map": _TOPIC,
     "Marker": "Marker Topic",
@@ -29,16 +32,19 @@ _TOPICS = {
     "PoseArray": _TOPIC,
     "PoseWithCovariance": _TOPIC,
     "Range": _TOPIC,
+    "WrenchStamped": _TOPIC,
 }
 _COLORS = {"AxisColor": "height", "Intensity": "intensity", "RGB8": "rgb"}
+_PICTURES = ("Camera", "Image")
 _CLOUDS = ("LaserScan", "PointCloud", "PointCloud2")
 
 
-def read_rviz(path: Path) -> tuple[Setup, list[str]]:
+def read_rviz(path: Path, resolve: Callable[[str], str]) -> tuple[Setup, list[str]]:
     """Return the setup that a file of rviz describes, and the displays that are not shown.
 
     Args:
         path: The file.
+        resolve: Function that returns the full name of a topic, after remapping.
 
     Raises:
         UsageError: It cannot be read, or is not one of rviz.
@@ -58,7 +64,11 @@ def read_rviz(path: Path) -> tuple[Setup, list[str]]:
     looks: list[Look] = []
     left_out: list[str] = []
     for one in listed:
-        look = _look(one)
+        try:
+            look = _look(one, resolve)
+        except RoszError as error:
+            left_out.append(f"{one.get('Name', 'a display')} ({error})")
+            continue
         if look is None:
             left_out.append(f"{one.get('Name', 'a display')} ({one.get('Class', 'no class')})")
         elif all(look.name != known.name for known in looks):
@@ -77,8 +87,12 @@ def _displays(listed: list[Any]) -> Iterator[dict[str, Any]]:
                 yield one
 
 
-def _look(display: dict[str, Any]) -> Look | None:
-    """Return the display of the view for one of rviz; None if there is none."""
+def _look(display: dict[str, Any], resolve: Callable[[str], str]) -> Look | None:
+    """Return the display of the view for one of rviz; None if there is none.
+
+    Raises:
+        InvalidName: The name of its topic is not legal.
+    """
     kind = str(display.get("Class", "")).rpartition("/")[2]
     visible = bool(display.get("Enabled", True))
     if kind == "Grid":
@@ -86,25 +100,30 @@ def _look(display: dict[str, Any]) -> Look | None:
     if kind == "TF":
         return Look(TF, size=0.3 * _number(display.get("Marker Scale"), 0.0), visible=visible)
     if kind == "RobotModel":
-        name = str(display.get("Robot Description") or "robot_description").removeprefix("/")
-        return Look(ROBOT if name == "robot_description" else f"{ROBOT}:/{name}", visible=visible)
-    field = _TOPICS.get(kind)
-    if field is None:
-        return None
-    topic = display.get(field, display.get(_TOPIC, ""))
+        name = resolve(str(display.get("Robot Description") or DESCRIPTION[1:]))
+        prefix = str(display.get("TF Prefix") or "").strip("/")
+        return Look(
+            ROBOT if name == DESCRIPTION else f"{ROBOT}:{name}", visible=visible, prefix=prefix
+        )
+    topic = display.get(_TOPICS.get(kind, ""), display.get(_TOPIC, ""))
     if isinstance(topic, dict):  # a file of rviz2
         topic = topic.get("Value", "")
-    if not topic:
+    if kind not in _TOPICS or not topic:
         return None
+    return _look_at_topic(display, kind, resolve(str(topic)), visible=visible)
+
+
+def _look_at_topic(display: dict[str, Any], kind: str, name: str, *, visible: bool) -> Look:
     color, size = _color(display.get("Color")), 0.0
     if kind in _CLOUDS:
         color = _COLORS.get(str(display.get("Color Transformer", "")), color)
         size = _number(display.get("Size (Pixels)"), 0.0)
     elif kind == "Map":
         color = "costmap" if display.get("Color Scheme") == "costmap" else ""
-    elif kind.startswith("Marker"):
+    elif kind.startswith("Marker") or kind in _PICTURES:
         color = ""
-    return Look(f"/{str(topic).removeprefix('/')}", color, size, visible)
+    keep = int(_number(display.get("Keep"), 0.0)) if kind == "Odometry" else 0
+    return Look(name, color, size, visible, keep=keep)
 
 
 def _number(value: Any, default: float) -> float:

@@ -10,7 +10,7 @@ import importlib.util
 import os
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlencode
@@ -27,69 +27,149 @@ __all__ = ("WINDOWS", "main", "page_of")
 
 _REMAP = re.compile(r"[^=\s]*:=")
 _WAIT_SECONDS = 5.0
-_VALUED = frozenset({"-d", "--display-config", "-f", "--fixed-frame", "-p", "--perspective"})
-_VALUED |= {"--perspective-file", "-s", "--standalone", "-t", "--splash-screen", "-l"}
+_VALUED_BY_RVIZ = {"-d", "--display-config", "-f", "--fixed-frame", "-s", "--splash-screen"}
+_VALUED_BY_RVIZ |= {"--help-file", "--opengl"}
+_VALUED_BY_RQT = {"-b", "--qt-binding", "-p", "--perspective", "--perspective-file"}
+_VALUED_BY_RQT |= {"-s", "--standalone"}
+
+Resolve = Callable[[str], str]
+"""Function that returns the full name of a topic, after remapping."""
+Page = Callable[[Sequence[str], Resolve], str]
+"""Function that returns the address of a page for the words of a command line."""
 
 
-def _plain(path: str) -> Callable[[Sequence[str]], str]:
-    return lambda _words: path
+def _plain(path: str) -> Page:
+    return lambda _words, _resolve: path
 
 
-def _topics(path: str, key: str) -> Callable[[Sequence[str]], str]:
+def _topics(path: str, key: str) -> Page:
     """Return a function that makes the address of a page from the topics that are given."""
 
-    def page(words: Sequence[str]) -> str:
-        names = [word if word.startswith("/") else f"/{word}" for word in words]
-        return f"{path}?{urlencode({key: ','.join(names)}, safe='/,:[]')}" if names else path
+    def page(words: Sequence[str], resolve: Resolve) -> str:
+        return _with_names(path, key, map(resolve, words))
 
     return page
 
 
-WINDOWS: dict[str, Callable[[Sequence[str]], str]] = {
+def _with_names(path: str, key: str, names: Iterable[str]) -> str:
+    text = ",".join(dict.fromkeys(names))
+    return f"{path}?{urlencode({key: text}, safe='/,:[]')}" if text else path
+
+
+def _namespace(resolve: Resolve) -> str:
+    """Return the namespace that names are resolved in, with a slash at its end."""
+    return resolve("rosz_page").removesuffix("rosz_page")
+
+
+def _fields(words: Sequence[str], resolve: Resolve) -> str:
+    """Return the page that plots fields; more than a name of a topic is not remapped."""
+    here = _namespace(resolve)
+    return _with_names(
+        "/plot", "fields", (word if word.startswith("/") else here + word for word in words)
+    )
+
+
+def _images(words: Sequence[str], resolve: Resolve) -> str:
+    """Return the page of images: those that are named, or what ``image:=`` names."""
+    names, image = list(map(resolve, words)), resolve("image")
+    if image != f"{_namespace(resolve)}image":
+        names.append(image)
+    return _with_names("/images", "topics", names)
+
+
+WINDOWS: dict[str, Page] = {
+    "image_view": lambda _words, resolve: _images(["image"], resolve),
     "rqt": _plain("/"),
+    "rqt_action": _plain("/actions"),
     "rqt_bag": _plain("/bags"),
     "rqt_console": _plain("/console"),
     "rqt_graph": _plain("/graph"),
     "rqt_gui": _plain("/"),
-    "rqt_image_view": _topics("/images", "topics"),
+    "rqt_image_view": _images,
+    "rqt_launch": _plain("/"),
     "rqt_logger_level": _plain("/console"),
-    "rqt_plot": _topics("/plot", "fields"),
+    "rqt_nav_view": _plain("/3d?show=grid,tf,/map&view=top"),
+    "rqt_plot": _fields,
     "rqt_publisher": _plain("/topics"),
     "rqt_reconfigure": _topics("/reconfigure", "server"),
-    "rqt_robot_steering": _plain("/drive"),
+    "rqt_robot_monitor": _plain("/topics?topic=/diagnostics_agg"),
+    "rqt_robot_steering": _topics("/drive", "topic"),
+    "rqt_runtime_monitor": _plain("/topics?topic=/diagnostics"),
     "rqt_service_caller": _plain("/services"),
     "rqt_tf_tree": _plain("/3d?show=grid,tf"),
+    "rqt_top": _plain("/"),
     "rqt_topic": _plain("/topics"),
     "rviz": _plain("/3d"),
 }
 """The names of windows, with the function that returns the page for their arguments."""
 
 
-def page_of(name: str, arguments: Sequence[str]) -> tuple[str, list[str]]:
+def page_of(name: str, arguments: Sequence[str], resolve: Resolve) -> tuple[str, list[str]]:
     """Return the address of the page of a window, without its host, and what it cannot show.
 
     Args:
         name: Name of the window.
         arguments: Its command line, without remappings.
+        resolve: Function that returns the full name of a topic, after remapping.
 
     Raises:
         UsageError: The file that it names cannot be read.
+        InvalidName: A name is not legal.
     """
     words: list[str] = []
     options: dict[str, str] = {}
+    valued = _VALUED_BY_RVIZ if name == "rviz" else _VALUED_BY_RQT
     rest = iter(arguments)
     for word in rest:
         option, equals, value = word.partition("=")
-        if option in _VALUED:
+        if option in valued:
             options[option] = value if equals else next(rest, "")
         elif not word.startswith("-"):
             words.append(word)
+    if name == "rviz":
+        return _page_of_rviz(words, options, resolve)
+    perspective = options.get("--perspective-file", "")
+    if perspective:
+        return _page_of_perspective(Path(perspective), resolve)
     plugin = options.get("-s", options.get("--standalone", ""))
-    plugin = re.split(r"[/.]", plugin)[0]
-    if name in {"rqt", "rqt_gui"} and plugin in WINDOWS:
-        name = plugin
-    if name != "rviz":
-        return WINDOWS[name](words), []
+    shown = _window_of(plugin) if name in {"rqt", "rqt_gui"} else name
+    notes = [f"not shown: {plugin}"] if plugin and not shown else []
+    return WINDOWS[shown or name](words, resolve), notes
+
+
+def _window_of(plugin: str) -> str:
+    """Return the window that a plugin of rqt is; empty if no page takes its place."""
+    name = re.split(r"[/.]", plugin)[0].replace("rqt_rviz", "rviz")
+    return name if name in WINDOWS else ""
+
+
+def _page_of_perspective(path: Path, resolve: Resolve) -> tuple[str, list[str]]:
+    """Return the page of the first plugin of a perspective, and those of the others.
+
+    Raises:
+        UsageError: The file cannot be read.
+        InvalidName: A name is not legal.
+    """
+    from rosz.web.perspective_file import read_perspective
+
+    plugins = read_perspective(path)
+    known = {one: _window_of(one) for one in plugins}
+    pages = [WINDOWS[known[one]](plugins[one], resolve) for one in plugins if known[one]]
+    left_out = [one for one in plugins if not known[one]]
+    notes = [f"and at {page}" for page in pages[1:]]
+    if left_out:
+        notes.append(f"not shown: {', '.join(left_out)}")
+    return pages[0] if pages else "/", notes
+
+
+def _page_of_rviz(
+    words: Sequence[str], options: dict[str, str], resolve: Resolve
+) -> tuple[str, list[str]]:
+    """Return the view in space that rviz is started with, and what it does not show.
+
+    Raises:
+        UsageError: The file cannot be read.
+    """
     file = options.get("-d", options.get("--display-config", words[0] if words else ""))
     fixed = options.get("-f", options.get("--fixed-frame", ""))
     if not file:
@@ -100,7 +180,7 @@ def page_of(name: str, arguments: Sequence[str]) -> tuple[str, list[str]]:
     from rosz.web.rviz_file import read_rviz
     from rosz.web.scene import format_setup
 
-    setup, left_out = read_rviz(Path(file))
+    setup, left_out = read_rviz(Path(file), resolve)
     if fixed:
         setup = msgspec.structs.replace(setup, frame=fixed)
     return format_setup(setup), [f"not shown: {', '.join(left_out)}"] if left_out else []
@@ -128,9 +208,12 @@ def _show(name: str, arguments: Sequence[str]) -> None:
         raise TransportError("the page needs libraries: pip install 'rosz[web]'")
     from rosz.node import Node
 
-    path, notes = page_of(name, [word for word in arguments if not _REMAP.match(word)])
     launched = any(word.startswith("__name:=") for word in arguments)
     with Node(name, anonymous=True) as node:
+        words = [word for word in arguments if not _REMAP.match(word)]
+        if name == "rqt_robot_steering":
+            words = [str(node.params.get("~default_topic", "/cmd_vel"))]
+        path, notes = page_of(name, words, node.resolve)
         address, server = _find_page(node), None
         if not address:
             try:

@@ -7,6 +7,7 @@ line of ROS 1; a field that a page changes is written into it.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -14,7 +15,7 @@ import msgspec
 import yaml
 
 from rosz.errors import DefinitionError, EncodeError, UsageError, YamlError
-from rosz.idl import MessageSpec, parse_message
+from rosz.idl import Constant, MessageSpec, parse_message
 from rosz.introspect.arguments import make_message, read_arguments
 from rosz.message import INTEGER_RANGES, Slot, slot_type, slots
 from rosz.message.convert import shown_name, to_plain
@@ -26,6 +27,8 @@ __all__ = ("Form", "FormField", "form_fields", "form_of", "read_form")
 _WIDE = frozenset({"int64", "uint64"})
 """Types whose values a browser's numbers do not hold."""
 _LINE = 90
+_WORD = re.compile(r"\w+")
+_CONSTANT = re.compile(r"[\w/<=]+\s+(\w+)\s*=")
 _EDITORS: dict[str, Literal["bool", "text"]] = {"bool": "bool", "string": "text", "wstring": "text"}
 
 
@@ -130,20 +133,50 @@ def _hint(spec: MessageSpec | None, name: str) -> str:
 
 
 def _choices(spec: MessageSpec | None, name: str, kind: str) -> dict[Any, str]:
-    """Return the constants that are meant for a field: by its name, or as the only one of a type.
+    """Return the constants that are meant for a field.
 
-    A definition does not tell which field its constants are for.
+    A definition does not say which field its constants are for. They are those that have the name
+    of the field in theirs, those below a comment that names it, or those of its type if it is the
+    only field of that type.
     """
     if spec is None or kind in ("bool", "float32", "float64"):
         return {}
-    constants = [one for one in spec.constants if one.type == kind]
-    named = [one for one in constants if one.name.startswith(f"{name.upper()}_")]
-    if not named:
+    constants = [one for one in spec.constants if _fits(one, kind)]
+    chosen = [one for one in constants if f"_{name.upper()}_" in f"_{one.name}"]
+    if not chosen:
+        headings = _headings(spec.text)
+        chosen = [one for one in constants if name in _WORD.findall(headings.get(one.name, ""))]
+    if not chosen:
         same = [one for one in spec.fields if one.type.base == kind]
-        named = constants if len(same) == 1 else []
+        chosen = [one for one in constants if one.type == kind] if len(same) == 1 else []
     found: dict[Any, str] = {}
-    for one in named:
+    for one in chosen:
         found[one.value] = f"{found[one.value]}, {one.name}" if one.value in found else one.name
+    return found
+
+
+def _fits(constant: Constant, kind: str) -> bool:
+    """Return whether a constant is a value of a type; uint8 constants of int32 fields are usual."""
+    if kind in INTEGER_RANGES and isinstance(constant.value, int):
+        low, high = INTEGER_RANGES[kind]
+        return low <= constant.value <= high
+    return constant.type == kind
+
+
+def _headings(text: str) -> dict[str, str]:
+    """Return the comment above the block of each constant of a definition."""
+    found: dict[str, str] = {}
+    heading, comment = "", False
+    for line in map(str.strip, text.splitlines()):
+        if line.startswith("#"):
+            heading, comment = f"{heading} {line}" if comment else line, True
+            continue
+        comment = False
+        constant = _CONSTANT.match(line)
+        if constant:
+            found[constant[1]] = heading
+        else:
+            heading = ""
     return found
 
 

@@ -11,7 +11,7 @@ from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 
 from rosz.errors import RoszError
-from rosz.web.model import Frames, System
+from rosz.web.model import IMAGE_TYPES, Frames, System
 from rosz.web.pages.layout import Frame, address_of
 from rosz.web.pages.pointing import Pointing
 from rosz.web.scene import (
@@ -39,8 +39,8 @@ _CHOICES = {
 }
 """The meanings that the color of a display can have, by its type."""
 _MARKERS = ("Robot", "visualization_msgs/Marker", "visualization_msgs/MarkerArray")
-_OWN_COLORS = frozenset({"Frames", "nav_msgs/OccupancyGrid", *_MARKERS})
-_OWN_SIZES = frozenset({"nav_msgs/OccupancyGrid", "sensor_msgs/Range", *_MARKERS})
+_OWN_COLORS = frozenset({"Frames", "nav_msgs/OccupancyGrid", *_MARKERS, *IMAGE_TYPES})
+_OWN_SIZES = _OWN_COLORS - {"Frames"} | {"nav_msgs/GridCells", "sensor_msgs/Range"}
 _NEED_COLOR = frozenset(
     {
         "geometry_msgs/PolygonStamped",
@@ -255,7 +255,7 @@ class _Shown:
         self._key = ""
         self._kind = ""
         self._number = 0
-        self._drawn: _Drawn | None = None
+        self._drawn: _Drawn | ui.interactive_image | None = None
         with ui.column().classes("rosz-card w-full pl-3 pr-1 py-1 gap-0") as self._card:
             with ui.row().classes("w-full items-center gap-1 no-wrap"):
                 ui.checkbox(value=look.visible, on_change=self._switch).props(
@@ -279,7 +279,9 @@ class _Shown:
 
     def _add_settings(self, kind: str) -> None:
         choices = _CHOICES.get(kind, {})
-        self._tune.set_visibility(not {kind} & _OWN_COLORS & _OWN_SIZES or bool(choices))
+        self._tune.set_visibility(
+            kind not in _OWN_COLORS & _OWN_SIZES or bool(choices) or kind == "Robot"
+        )
         with self._settings:
             if choices:
                 ui.select(
@@ -301,6 +303,20 @@ class _Shown:
                     step=0.1,
                     on_change=lambda e: self._set(size=float(e.value or 0)),
                 ).props("dense").classes("w-20")
+            if kind == "nav_msgs/Odometry":
+                ui.number(
+                    "Keep",
+                    value=self.look.keep or None,
+                    min=1,
+                    precision=0,
+                    on_change=lambda e: self._set(keep=int(e.value or 0)),
+                ).props("dense").classes("w-20")
+            if kind == "Robot":
+                ui.input(
+                    "Prefix of its frames",
+                    value=self.look.prefix,
+                    on_change=lambda e: self._set(prefix=str(e.value or "").strip("/")),
+                ).props("dense debounce=400").classes("grow min-w-0")
 
     def _set(self, **changes: Any) -> None:
         self.look = msgspec.structs.replace(self.look, **changes)
@@ -319,8 +335,12 @@ class _Shown:
         """Show what a display draws."""
         self.display = display
         self._key = self._system.pictures.add(display.encoded)
-        with self._scene:
-            self._drawn = _Drawn("")
+        if display.kind in IMAGE_TYPES:
+            with self._card:
+                self._drawn = ui.interactive_image().classes("w-full pr-2 pb-1")
+        else:
+            with self._scene:
+                self._drawn = _Drawn("")
         self._kind = display.kind
         self._add_settings(display.kind)
 
@@ -334,7 +354,13 @@ class _Shown:
             return
         if self.display.refresh(fixed):
             self._number += 1
-            self._drawn.renew(f"/picture/{self._key}?n={self._number}")
+            address = f"/picture/{self._key}?n={self._number}"
+            if isinstance(self._drawn, _Drawn):
+                self._drawn.renew(address)
+            else:
+                self._drawn.set_source(address)
+        if not isinstance(self._drawn, _Drawn):
+            self._drawn.set_visibility(self.look.visible)
         status = self.display.status
         _set(self._status, f"{self._kind}: {status}" if status else self._kind)
         _set(self._fault, self.display.fault)
@@ -342,7 +368,7 @@ class _Shown:
     def remove(self) -> None:
         """Take it off the page."""
         self.close()
-        if self._drawn is not None:
+        if isinstance(self._drawn, _Drawn):
             self._drawn.delete()
         self._card.delete()
 

@@ -7,11 +7,22 @@ fixed frame when a browser asks for it. Needs numpy.
 from rosz.web.scene.display import Display
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.opening import list_displays, open_display
-from rosz.web.scene.setup import DEFAULT, GRID, ROBOT, TF, Look, Setup, format_setup, read_setup
+from rosz.web.scene.setup import (
+    DEFAULT,
+    DESCRIPTION,
+    GRID,
+    ROBOT,
+    TF,
+    Look,
+    Setup,
+    format_setup,
+    read_setup,
+)
 from rosz.web.scene.tools import TOOLS, Tools
 
 __all__ = (
     "DEFAULT",
+    "DESCRIPTION",
     "GRID",
     "ROBOT",
     "TF",

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from rosz.errors import RoszError, TransformError
+from rosz.errors import MessageError, RoszError, TransformError
 from rosz.introspect.measure import read_stamp
 from rosz.introspect.subscribe import find_class, find_token, topic_types
 from rosz.names import short_type
 from rosz.transforms import IDENTITY, Pose
-from rosz.web.model import Frames, read_frame
+from rosz.web.model import Frames, ImageWatch, read_frame
 from rosz.web.scene import poses, sensors
 from rosz.web.scene.colors import color_bytes
 from rosz.web.scene.drawing import MEDIA, Drawing
@@ -25,7 +25,14 @@ if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
     from rosz.node import Node
 
-__all__ = ("DRAWN_TYPES", "Display", "FrameDisplay", "GridDisplay", "TopicDisplay")
+__all__ = (
+    "DRAWN_TYPES",
+    "Display",
+    "FrameDisplay",
+    "GridDisplay",
+    "ImageDisplay",
+    "TopicDisplay",
+)
 
 _QUEUE = 10
 _MOST_BYTES = 32 << 20
@@ -40,6 +47,8 @@ _DRAW: dict[str, _Draw] = {
     "geometry_msgs/PoseArray": poses.draw_poses,
     "geometry_msgs/PoseStamped": poses.draw_stamped_pose,
     "geometry_msgs/PoseWithCovarianceStamped": poses.draw_stamped_pose,
+    "geometry_msgs/WrenchStamped": poses.draw_wrench,
+    "nav_msgs/GridCells": poses.draw_cells,
     "nav_msgs/OccupancyGrid": poses.draw_map,
     "nav_msgs/Odometry": poses.draw_stamped_pose,
     "nav_msgs/Path": poses.draw_path,
@@ -175,6 +184,74 @@ class FrameDisplay:
         """Do nothing; the frames belong to all pages."""
 
 
+class ImageDisplay:
+    """The newest image of a topic, beside the view.
+
+    Args:
+        node: The node that subscribes to it.
+        survey: The running nodes.
+        look: Its settings.
+
+    Raises:
+        NotFoundError: There is no such topic.
+        UsageError: A library is not installed.
+    """
+
+    def __init__(self, node: Node, survey: Survey, look: Look) -> None:
+        self.look = look
+        self.status = ""
+        self.fault = ""
+        self._open: Callable[[], ImageWatch] = lambda: ImageWatch(node, survey, look.name)
+        self._watch: ImageWatch | None = self._open()
+        self.kind: str = short_type(self._watch.type_name)
+        self._shown = 0
+        if not look.visible:
+            self._switch()
+
+    def _switch(self) -> None:
+        """Subscribe when it is shown again, and unsubscribe when it is hidden."""
+        watch, self._watch = self._watch, None
+        if watch is None:
+            self._watch, self._shown = self._open(), 0
+        else:
+            self.status = ""
+            watch.close()
+
+    def refresh(self, fixed: str) -> bool:
+        """Return whether there is a new image."""
+        del fixed
+        if self.look.visible != (self._watch is not None):
+            self._switch()
+        watch = self._watch
+        if watch is None or watch.received == self._shown:
+            return False
+        self._shown, self.status = watch.received, watch.description()
+        return True
+
+    def encoded(self) -> tuple[bytes, str]:
+        """Return the newest image as a file.
+
+        Raises:
+            MessageError: The message is not an image, or none has come.
+        """
+        watch = self._watch
+        if watch is None:
+            raise MessageError(f"'{self.look.name}' is not shown")
+        try:
+            found = watch.encoded()
+        except MessageError as error:
+            self.fault = str(error)
+            raise
+        self.fault = ""
+        return found
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        watch, self._watch = self._watch, None
+        if watch is not None:
+            watch.close()
+
+
 class _Kept(NamedTuple):
     """A message that has come, as bytes."""
 
@@ -211,6 +288,7 @@ class TopicDisplay:
         self.fault: str = ""
         self.received: int = 0
         self._draw = _DRAW[self.kind]
+        self._trail = poses.Trail() if self.kind == "nav_msgs/Odometry" else None
         self._frames = frames
         self._stamped: bool = cls._has_header
         self._decode = node.context.decoder(cls)
@@ -241,6 +319,8 @@ class TopicDisplay:
             self._kept.append(_Kept(payload, frame, stamp, self.received))
             while len(self._kept) > 1 and sum(len(one.payload) for one in self._kept) > _MOST_BYTES:
                 self._kept.popleft()
+            if self._trail is not None:
+                self._trail.add(self._decode(payload), self.look.keep)
 
     def refresh(self, fixed: str) -> bool:
         """Choose the newest message whose transform is known; return whether to draw it."""
@@ -278,6 +358,8 @@ class TopicDisplay:
         subscription.close()
         with self._lock:
             self._kept.clear()
+            if self._trail is not None:
+                self._trail.clear()
         self._chosen, self.status, self.fault = None, "", ""
         self._wanted = (self.look,)
 
@@ -290,6 +372,9 @@ class TopicDisplay:
             one, pose = chosen
             try:
                 self.status = self._draw(self._decode(one.payload), pose, look, drawing)
+                if self._trail is not None:
+                    with self._lock:
+                        self.status += f", {self._trail.draw(pose, look, drawing)} kept"
                 self.fault = ""
             except RoszError as error:
                 self.fault = str(error)

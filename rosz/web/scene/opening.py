@@ -8,19 +8,26 @@ from rosz.errors import NotFoundError, UsageError
 from rosz.introspect.subscribe import topic_types
 from rosz.introspect.topics import list_topics
 from rosz.names import short_type
-from rosz.web.model import Frames, System
-from rosz.web.scene.display import DRAWN_TYPES, Display, FrameDisplay, GridDisplay, TopicDisplay
+from rosz.web.model import IMAGE_TYPES, Frames, System
+from rosz.web.scene.display import (
+    DRAWN_TYPES,
+    Display,
+    FrameDisplay,
+    GridDisplay,
+    ImageDisplay,
+    TopicDisplay,
+)
 from rosz.web.scene.markers import MARKER_TYPES, MarkerDisplay
 from rosz.web.scene.meshes import Meshes
-from rosz.web.scene.robot import DESCRIPTION, RobotDisplay
-from rosz.web.scene.setup import GRID, ROBOT, TF, Look
+from rosz.web.scene.robot import RobotDisplay
+from rosz.web.scene.setup import DESCRIPTION, GRID, ROBOT, TF, Look
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
 
 __all__ = ("list_displays", "open_display")
 
-_TYPES = DRAWN_TYPES | MARKER_TYPES
+_TYPES = DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES
 
 
 def list_displays(survey: Survey) -> dict[str, str]:
@@ -64,6 +71,8 @@ def open_display(
         raise NotFoundError(f"topic '{name}' does not exist yet")
     if types[0] in MARKER_TYPES:
         return MarkerDisplay(node, survey, look, frames, meshes)
+    if types[0] in IMAGE_TYPES:
+        return ImageDisplay(node, survey, look)
     if types[0] not in DRAWN_TYPES:
         raise UsageError(f"topic '{name}' is of type {types[0]}, which is not drawn")
     return TopicDisplay(node, survey, look, frames)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from rosz.web.scene.setup import Look
 from rosz.web.scene.shapes import draw_arrows, draw_line
 
 __all__ = (
+    "Trail",
+    "draw_cells",
     "draw_grid",
     "draw_map",
     "draw_path",
@@ -23,13 +26,19 @@ __all__ = (
     "draw_pose",
     "draw_poses",
     "draw_stamped_pose",
+    "draw_wrench",
     "pose_from",
 )
 
 _LENGTH = 1.0
+_THIN = 0.005
 _SHORT = 0.3
 _MOST_CELLS = 4096
 _GRID_CELLS = 10
+_KEPT = 100
+"""Number of poses of an odometry that stay drawn, as in rviz."""
+_STEP, _TURN = 0.1, 0.1
+"""Metres and radians that a pose differs from the last one that stays, as in rviz."""
 
 
 def pose_from(message: Any) -> Pose:
@@ -62,6 +71,73 @@ def draw_stamped_pose(message: Any, pose: Pose, look: Look, drawing: Drawing) ->
     return draw_pose(inner, pose, look, drawing)
 
 
+class Trail:
+    """The poses of an odometry that stay drawn, in the frame of its messages."""
+
+    def __init__(self) -> None:
+        self._poses: deque[Pose] = deque(maxlen=_KEPT)
+        self._frame = ""
+
+    def add(self, message: Any, keep: int) -> None:
+        """Keep the pose of a message if it is another one.
+
+        Args:
+            message: An Odometry.
+            keep: Number of poses that are kept; 0 for the default.
+        """
+        pose = pose_from(message.pose.pose)
+        if self._poses.maxlen != (keep or _KEPT):
+            self._poses = deque(self._poses, keep or _KEPT)
+        if self._frame != message.header.frame_id:
+            self._frame = message.header.frame_id
+            self._poses.clear()
+        if not all(map(math.isfinite, (*pose.translation, *pose.rotation))):
+            return
+        if not self._poses or _differ(self._poses[-1], pose):
+            self._poses.append(pose)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._poses.clear()
+
+    def draw(self, pose: Pose, look: Look, drawing: Drawing) -> int:
+        """Draw an arrow for each, and return their number."""
+        matrices = [matrix_of(compose(pose, one)) for one in list(self._poses)]
+        length = look.size or _LENGTH
+        draw_arrows(drawing, matrices, color_bytes(look.color), length=length, width=length / 5)
+        return len(matrices)
+
+
+def _differ(one: Pose, other: Pose) -> bool:
+    along = math.dist(one.translation, other.translation)
+    cosine = abs(sum(a * b for a, b in zip(one.rotation, other.rotation, strict=True)))
+    return along > _STEP or 2 * math.acos(min(cosine, 1.0)) > _TURN
+
+
+def draw_wrench(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a WrenchStamped: its force, and its torque in another color."""
+    size = look.size or _LENGTH
+    texts = []
+    for name, vector, color in (
+        ("force", message.wrench.force, color_bytes(look.color, "#cc3333")),
+        ("torque", message.wrench.torque, color_bytes("#c9a227")),
+    ):
+        ends = moved(np.array([(0.0, 0.0, 0.0), (vector.x, vector.y, vector.z)]) * size, pose)
+        draw_line(drawing, ends, color, size / 20)
+        texts.append(f"{name} {math.hypot(vector.x, vector.y, vector.z):.2f}")
+    return ", ".join(texts)
+
+
+def draw_cells(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw a GridCells as flat rectangles."""
+    places = np.array([(p.x, p.y, p.z) for p in message.cells]).reshape(-1, 3)
+    local = np.zeros((len(places), 4, 4))
+    local[:] = np.diag((message.cell_width, message.cell_height, _THIN, 1.0))
+    local[:, :3, 3] = places
+    drawing.shapes("cube", matrix_of(pose) @ local, color_bytes(look.color, "#19ff00"))
+    return f"{len(places)} cells of {message.cell_width:g} x {message.cell_height:g} m"
+
+
 def _draw_covariance(
     covariance: Any, pose: Pose, place: Pose, look: Look, drawing: Drawing
 ) -> None:
@@ -73,7 +149,7 @@ def _draw_covariance(
     reach = 2 * np.sqrt(np.clip(values, 0.0, None))
     local = np.eye(4)
     local[:2, 0], local[:2, 1] = axes[:, 0] * reach[0], axes[:, 1] * reach[1]
-    local[2, 2] = 0.005
+    local[2, 2] = _THIN
     turned = matrix_of(Pose((0.0, 0.0, 0.0), pose.rotation)) @ local
     turned[:3, 3] = place.translation
     color = color_bytes(look.color)

@@ -15,14 +15,13 @@ from rosz.web.model import Frames
 from rosz.web.scene.colors import color_bytes
 from rosz.web.scene.drawing import MEDIA, Array, Drawing, placed
 from rosz.web.scene.meshes import Meshes
-from rosz.web.scene.setup import ROBOT, Look
+from rosz.web.scene.setup import DESCRIPTION, ROBOT, Look
 
 if TYPE_CHECKING:
     from rosz.node import Node
 
-__all__ = ("DESCRIPTION", "RobotDisplay", "Visual", "draw_visual", "read_visuals")
+__all__ = ("RobotDisplay", "Visual", "draw_visual", "read_visuals")
 
-DESCRIPTION = "/robot_description"
 _GRAY = color_bytes("#c4c9d4")
 _SOME = 3
 
@@ -36,6 +35,7 @@ class Visual(NamedTuple):
         shape: ``cube``, ``sphere``, ``cylinder``, or a URI of a mesh.
         size: Its size in metres, or the scale of the mesh.
         color: Its color; None for that of the mesh.
+        texture: File of the texture that its material has; empty for none.
     """
 
     link: str
@@ -43,6 +43,7 @@ class Visual(NamedTuple):
     shape: str
     size: tuple[float, float, float]
     color: Array | None
+    texture: str
 
 
 def read_visuals(description: str) -> list[Visual]:
@@ -81,19 +82,24 @@ def _read_visual(link: str, visual: ET.Element, materials: dict[str, ET.Element]
         x, y, z = _numbers(origin.get("xyz", "0 0 0"))
         pose = Pose((x, y, z), from_rpy(*_numbers(origin.get("rpy", "0 0 0"))))
     shape = geometry[0]
-    color = _color_of(visual.find("material"), materials)
+    material = visual.find("material")
+    color, texture = _color_of(material, materials), _texture_of(material, materials)
+    return Visual(link, pose, *_read_shape(shape), color, texture)
+
+
+def _read_shape(shape: ET.Element) -> tuple[str, tuple[float, float, float]]:
+    """Return the shape of a visual, and its size."""
     if shape.tag == "box":
-        return Visual(link, pose, "cube", _numbers(shape.get("size", "")), color)
+        return "cube", _numbers(shape.get("size", ""))
     if shape.tag == "sphere":
         width = 2 * float(shape.get("radius", ""))
-        return Visual(link, pose, "sphere", (width, width, width), color)
+        return "sphere", (width, width, width)
     if shape.tag == "cylinder":
         width, length = 2 * float(shape.get("radius", "")), float(shape.get("length", ""))
-        return Visual(link, pose, "cylinder", (width, width, length), color)
+        return "cylinder", (width, width, length)
     if shape.tag == "mesh":
-        scale = _numbers(shape.get("scale", "1 1 1"))
-        return Visual(link, pose, shape.get("filename", ""), scale, color)
-    return Visual(link, pose, f"<{shape.tag}>", (1.0, 1.0, 1.0), color)
+        return shape.get("filename", ""), _numbers(shape.get("scale", "1 1 1"))
+    return f"<{shape.tag}>", (1.0, 1.0, 1.0)
 
 
 def _numbers(text: str) -> tuple[float, float, float]:
@@ -103,15 +109,25 @@ def _numbers(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _color_of(material: ET.Element | None, materials: dict[str, ET.Element]) -> Array | None:
+def _texture_of(material: ET.Element | None, materials: dict[str, ET.Element]) -> str:
+    texture = _find_in(material, materials, "texture")
+    return "" if texture is None else texture.get("filename", "")
+
+
+def _find_in(
+    material: ET.Element | None, materials: dict[str, ET.Element], tag: str
+) -> ET.Element | None:
+    """Return a part of a material, or of the one of the robot that it names."""
     if material is None:
         return None
-    known = (
-        material
-        if material.find("color") is not None
-        else materials.get(material.get("name", ""), material)
-    )
-    color = known.find("color")
+    found = material.find(tag)
+    if found is None and not len(material):
+        found = materials.get(material.get("name", ""), material).find(tag)
+    return found
+
+
+def _color_of(material: ET.Element | None, materials: dict[str, ET.Element]) -> Array | None:
+    color = _find_in(material, materials, "color")
     if color is None:
         return None
     values = np.array([float(value) for value in color.get("rgba", "").split()])
@@ -210,9 +226,12 @@ class RobotDisplay:
         """Draw all links, and return what cannot be drawn."""
         lost: dict[str, str] = {}
         faults: dict[str, None] = {}
+        before = f"{self.look.prefix}/" if self.look.prefix else ""
         for visual in visuals:
+            if visual.texture:
+                faults[f"link '{visual.link}': the texture '{visual.texture}' is not shown"] = None
             try:
-                pose = self._frames.find(fixed, visual.link)
+                pose = self._frames.find(fixed, f"{before}{visual.link}")
             except TransformError as error:
                 lost.setdefault(visual.link, str(error).strip())
                 continue

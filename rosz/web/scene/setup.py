@@ -12,11 +12,24 @@ from urllib.parse import urlencode
 
 import msgspec
 
-__all__ = ("DEFAULT", "GRID", "ROBOT", "TF", "Look", "Setup", "format_setup", "read_setup")
+__all__ = (
+    "DEFAULT",
+    "DESCRIPTION",
+    "GRID",
+    "ROBOT",
+    "TF",
+    "Look",
+    "Setup",
+    "format_setup",
+    "read_setup",
+)
 
 GRID, TF, ROBOT = "grid", "tf", "robot"
+DESCRIPTION = "/robot_description"
+"""The parameter of the robot that has no other name."""
 _BETWEEN, _WITHIN = ",", ";"
 _MOST_SIZE = 1000.0
+_MOST_KEPT = 100_000
 
 
 class Look(msgspec.Struct, frozen=True):
@@ -27,12 +40,16 @@ class Look(msgspec.Struct, frozen=True):
         color: ``#rrggbb``, ``height``, ``intensity`` or ``rgb``; empty for the default.
         size: Size in the unit of the display; 0 for the default.
         visible: Whether it is drawn.
+        keep: Number of poses of an odometry that stay drawn; 0 for the default.
+        prefix: What is before the names of the frames of a robot (``tf_prefix``).
     """
 
     name: str
     color: str = ""
     size: float = 0.0
     visible: bool = True
+    keep: int = 0
+    prefix: str = ""
 
 
 class Setup(msgspec.Struct, frozen=True):
@@ -66,7 +83,15 @@ def _read_look(text: str) -> Look:
     except ValueError:
         size = 0.0
     size = min(max(size, 0.0), _MOST_SIZE) if math.isfinite(size) else 0.0
-    return Look(name, found.get("color", ""), size, "hidden" not in found)
+    keep = int(found["keep"]) if found.get("keep", "").isdecimal() else 0
+    return Look(
+        name,
+        found.get("color", ""),
+        size,
+        "hidden" not in found,
+        keep=min(keep, _MOST_KEPT),
+        prefix=found.get("prefix", "").strip("/"),
+    )
 
 
 def format_setup(setup: Setup) -> str:
@@ -83,6 +108,10 @@ def _format_look(look: Look) -> str:
         parts.append(f"color={look.color}")
     if look.size:
         parts.append(f"size={look.size:g}")
+    if look.keep:
+        parts.append(f"keep={look.keep}")
+    if look.prefix:
+        parts.append(f"prefix={look.prefix}")
     if not look.visible:
         parts.append("hidden")
     return _WITHIN.join(parts)

@@ -1,0 +1,131 @@
+"""Displays of odometry, images, cells, wrenches and robots with a prefix, without a browser."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from network import Network, eventually
+
+from rosz.environment import Environment
+from rosz.msgs.geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
+from rosz.msgs.nav_msgs.msg import GridCells, Odometry
+from rosz.msgs.sensor_msgs.msg import Image
+from rosz.msgs.std_msgs.msg import Header
+from rosz.transforms import IDENTITY
+from rosz.web.model import Frames, Permission, System
+from rosz.web.scene import Look, Meshes, Setup, format_setup, open_display, read_setup
+from rosz.web.scene.drawing import Drawing
+from rosz.web.scene.poses import Trail, draw_cells, draw_wrench
+from rosz.web.scene.robot import RobotDisplay
+
+from .test_scene import ASIDE, parts
+
+FLAT = Quaternion(0, 0, 0, 1)
+URDF = """<robot name="r"><link name="base"><visual><geometry><box size="1 1 1"/></geometry>
+<material name="wood"><texture filename="package://r/wood.png"/></material></visual></link>
+</robot>"""
+
+
+def odometry(x: float, frame: str = "odom") -> Odometry:
+    pose = PoseWithCovariance(pose=Pose(Point(x, 0, 0), FLAT))
+    return Odometry(header=Header(frame_id=frame), child_frame_id="base", pose=pose)
+
+
+def test_poses_of_an_odometry_stay_as_it_moves() -> None:
+    trail, drawing = Trail(), Drawing()
+    for x in (0.0, 0.05, 0.2, 0.3, 1.0, float("nan")):
+        trail.add(odometry(x), 0)
+    assert trail.draw(ASIDE, Look("/odom", size=0.5), drawing) == 3
+    shaft, tip = parts(drawing)
+    assert (shaft["shape"], tip["shape"]) == ("cylinder", "cone")
+    assert np.allclose(tip["matrices"][:, 0, 3], [10 - x - 0.425 for x in (0.0, 0.2, 1.0)])
+    for x in range(10):
+        trail.add(odometry(x), 4)
+    assert trail.draw(IDENTITY, Look("/odom"), Drawing()) == 4
+    trail.add(odometry(0.0, "map"), 4)
+    assert trail.draw(IDENTITY, Look("/odom"), Drawing()) == 1
+
+
+def test_cells_and_wrenches_are_drawn() -> None:
+    drawing = Drawing()
+    cells = GridCells(cell_width=0.5, cell_height=0.25, cells=[Point(1, 2, 0), Point(2, 2, 0)])
+    assert draw_cells(cells, IDENTITY, Look("/cells"), drawing) == "2 cells of 0.5 x 0.25 m"
+    (cubes,) = parts(drawing)
+    assert np.allclose(cubes["matrices"][1].diagonal()[:2], (0.5, 0.25))
+    assert np.allclose(cubes["matrices"][:, :2, 3], [(1, 2), (2, 2)])
+    drawing = Drawing()
+    wrench = WrenchStamped(wrench=Wrench(force=Vector3(3, 4, 0), torque=Vector3(0, 0, 2)))
+    assert draw_wrench(wrench, IDENTITY, Look("/w"), drawing) == "force 5.00, torque 2.00"
+    force, torque = parts(drawing)
+    assert np.allclose(force["matrices"][0, :3, 3], (1.5, 2, 0))
+    assert np.allclose(torque["matrices"][0, :3, 3], (0, 0, 1))
+    draw_wrench(WrenchStamped(), IDENTITY, Look("/w"), Drawing())
+
+
+def test_an_address_holds_what_stays_and_the_prefix() -> None:
+    setup = Setup("map", (Look("/odom", keep=7), Look("robot", prefix="tb3_0")))
+    assert format_setup(setup) == "/3d?frame=map&show=/odom;keep=7,robot;prefix=tb3_0"
+    assert read_setup("map", "/odom;keep=7,robot;prefix=tb3_0", "") == setup
+    assert read_setup("", "/odom;keep=-1;prefix=", "").looks == (Look("/odom"),)
+
+
+def test_images_and_trails_of_topics_are_displayed(network: Network) -> None:
+    pytest.importorskip("cv2")
+    robot, page = network.node("robot"), network.node("page")
+    camera = robot.publisher("camera", Image, latch=True)
+    odom = robot.publisher("odom", Odometry)
+    system = System(page, Permission())
+    graph = system.graph.use().value
+    eventually(lambda: graph.survey().view.publishers("/odom"), "the odometry")
+    eventually(lambda: graph.survey().view.publishers("/camera"), "the camera")
+    frames = Frames(page)
+    meshes = Meshes(Environment.read({}), lambda _: "")
+    look = Look("/camera")
+    image = open_display(system, graph.survey(), frames, meshes, look)
+    camera.publish(Image(height=2, width=2, encoding="mono8", step=2, data=bytes(4)))
+    eventually(lambda: image.refresh("odom"), "the image")
+    assert (image.kind, image.status) == ("sensor_msgs/Image", "2 x 2 mono8")
+    assert image.encoded()[1] == "image/jpeg"
+    assert not image.refresh("odom")
+    image.look = Look("/camera", visible=False)
+    assert not image.refresh("odom")
+    eventually(lambda: not camera.subscribers(), "no subscription while it is hidden")
+    display = open_display(system, graph.survey(), frames, meshes, Look("/odom"))
+    eventually(odom.subscribers, "the subscription")
+    for x in range(3):
+        odom.publish(odometry(x))
+
+    def all_drawn() -> bool:
+        display.refresh("odom")
+        display.encoded()
+        return display.status == "x 2.00, y 0.00, z 0.00, 3 kept"
+
+    eventually(all_drawn, "three poses")
+    for one in (image, display, frames):
+        one.close()
+
+
+def test_a_robot_with_a_prefix_has_other_frames(network: Network) -> None:
+    page = network.node("page")
+    page.params.set("/robot_description", URDF)
+    frames = Frames(page)
+    meshes = Meshes(Environment.read({}), lambda _: "")
+    display = RobotDisplay(page, Look("robot", prefix="tb3_0"), frames, meshes)
+    display.refresh("tb3_0/base")
+    (cube,) = parts(display.encoded()[0])
+    assert cube["shape"] == "cube"
+    assert display.fault == "link 'base': the texture 'package://r/wood.png' is not shown"
+    display.look = Look("robot")
+    display.refresh("tb3_0/base")
+    assert parts(display.encoded()[0]) == []
+    assert "no transform to 'tb3_0/base'" in display.fault
+    display.close()
+    frames.close()
