@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Self
 
 from rosz.bags.bag import SMALL, Attachment, Channel, Compression, Payload
+from rosz.bags.writing import mark_written
 from rosz.errors import BagError, ClosedError
 from rosz.worker import Worker
 
@@ -123,6 +124,7 @@ class ChunkWriter:
             self._file = os.open(path, flags, 0o666)
         except OSError as error:
             raise BagError(f"cannot create it: {error.strerror}", str(path)) from error
+        mark_written(self._file)
         self._lock = threading.Lock()
         self._room = threading.Condition(self._lock)
         self._error: BagError | None = None

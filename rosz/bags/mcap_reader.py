@@ -22,7 +22,8 @@ import msgspec
 from rosz.bags import mcap_records as mcap
 from rosz.bags.bag import Attachment, Channel, Chunk, DamageReport, Entry, Payload
 from rosz.bags.mcap_records import HEAD, MAGIC, MESSAGE, Cursor, DamagedRecord, Op
-from rosz.errors import BagError, BagUnindexed
+from rosz.bags.writing import unindexed
+from rosz.errors import BagError
 
 __all__ = ("McapReader",)
 
@@ -173,9 +174,7 @@ class McapReader:
             self._spans, self._metadata, self._attachments = [], {}, []
             self._scan()
             if not scan and not self._found:
-                self._found.append(
-                    BagUnindexed("it has no index, as after a recorder was killed", str(self.path))
-                )
+                self._found.append(unindexed(str(self.path), self._file))
         if self._spans and not self.end:
             self.start = min(span.start for span in self._spans)
             self.end = max(span.end for span in self._spans)

@@ -162,7 +162,9 @@ class Player:
         self._tick: Callable[[int], None] | None = None
         self._controlled = self._start  # the latest stamp of the topic that controls the rate
         self._topics = self._chosen_topics()
-        if self._start > last:
+        if not counted:
+            self._warn("nothing to play: the bags have no messages")
+        elif self._start > last:
             self._warn(
                 f"nothing to play: --start {options.start:g} is behind the end of the bags, which"
                 f" have {(last - first) / _NS:.1f} s"
@@ -176,6 +178,8 @@ class Player:
             self._problem(
                 f"no topic '{missing[0]}' in the bags; they have {', '.join(sorted(known))}"
             )
+        for one in sorted(set(map(_absolute, self._options.pause_topics)) - known):
+            self._warn(f"no topic '{one}' to pause at in the bags")
         chosen = wanted & known if wanted else known
         if self._options.clock and _CLOCK in chosen:
             chosen.discard(_CLOCK)

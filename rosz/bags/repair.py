@@ -13,6 +13,7 @@ from rosz.bags.bag import BagReader, BagWriter, Channel, Compression, Entry
 from rosz.bags.messages import class_of
 from rosz.bags.opening import ACTIVE, create_writer, open_reader
 from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
+from rosz.bags.writing import refuse_written
 from rosz.errors import BagError, RoszError
 from rosz.typestore import TypeStore
 
@@ -130,8 +131,8 @@ def rewrite(
         force: Whether an older backup is replaced.
 
     Raises:
-        BagError: There is a backup already, the bag cannot be read at all, or the copy cannot be
-            written.
+        BagError: There is a backup already, the bag is being recorded or cannot be read at all, or
+            the copy cannot be written.
         UsageError: The format has no such compression.
     """
     name = path.name.removesuffix(ACTIVE)
@@ -142,6 +143,7 @@ def rewrite(
         raise BagError(f"the backup '{backup}' exists already; -f replaces it", str(path))
     if backup is None and target.exists():
         raise BagError(f"'{target}' exists already", str(path))
+    refuse_written(str(path))
     with open_reader(path) as reader:
         wanted = _compression_of(reader) if compression is None else compression
         if isinstance(reader, SqliteReader):

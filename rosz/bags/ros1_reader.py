@@ -185,7 +185,8 @@ class Ros1Reader:
                 elif head.op == OP_CONNECTION:
                     self._add_connection(head, self._data(head), place)
             except RecordError as error:
-                self._damage.append(self._error(error))
+                if not self._damage or self._damage[-1].offset != error.offset:
+                    self._damage.append(self._error(error))
                 place = self._next_chunk(place + 1)
                 continue
             if head.op == OP_CHUNK and head.end > self.size:

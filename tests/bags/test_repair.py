@@ -61,6 +61,25 @@ def test_an_active_bag_gets_its_name(tmp_path: Path) -> None:
         rewrite(path, None)
 
 
+def test_a_bag_that_is_being_written_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap.active"
+    with McapWriter(path) as writer:
+        writer.write(writer.add(CHATTER), 1, String(data="hello").to_cdr())
+        writer.flush()
+        with McapReader(path) as reader:
+            (problem,) = reader.problems
+            assert "it is being recorded" in str(problem)
+            assert reader.count() == 1
+        with pytest.raises(BagError, match="it is being recorded; end the recorder first"):
+            rewrite(path, None)
+        data = path.read_bytes()
+    path.write_bytes(data)  # as after the writer was killed
+    with McapReader(path) as reader:
+        (problem,) = reader.problems
+        assert "as after a recorder was killed" in str(problem)
+    assert rewrite(path, None).count == 1
+
+
 def test_the_rest_of_a_damaged_bag_is_recovered(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

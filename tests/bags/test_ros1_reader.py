@@ -111,6 +111,13 @@ def test_without_permission_to_skip_damage_it_is_raised(tmp_path: Path) -> None:
             list(bag.messages())
 
 
+def test_a_bag_that_ends_within_its_header_has_one_problem(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "x.bag", _messages())
+    os.truncate(path, 900)
+    with Ros1Reader(path) as bag:
+        assert [one.offset for one in bag.problems] == [13]
+
+
 def test_damage_to_chunk_and_index_costs_no_more_than_what_it_hits(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "x.bag", _messages())
     whole, _ = _read(path)

@@ -13,7 +13,7 @@ from rosz.cli.bag.group import app
 from rosz.cli.call import Call
 from rosz.cli.console import print_error, print_lines, takes_escapes, warn
 from rosz.cli.declare import Argument, Option, at_least, no_less_than_zero, per_second
-from rosz.errors import ClosedError
+from rosz.errors import ClosedError, UsageError
 
 if TYPE_CHECKING:
     from rosz.bags import BagReader
@@ -27,6 +27,7 @@ _FASTER = 1.1
 _SWITCH_SECONDS = 0.0001
 """The thread that reads ahead must not keep the one that publishes waiting for longer."""
 _DEFAULT_CLOCK = 100.0
+_MOST_TIMES = 1_000_000
 
 
 def list_topics(words: list[str]) -> list[str]:
@@ -47,7 +48,7 @@ def list_topics(words: list[str]) -> list[str]:
         if word == "--clock":
             found.append(word)
             word = next(left)
-            if word.replace(".", "", 1).isdigit():
+            if _is_number(word):
                 found.append(f"--hz={word}")
                 word = next(left)
             continue
@@ -55,6 +56,22 @@ def list_topics(words: list[str]) -> list[str]:
             found.append(word.removeprefix("--bags="))
         word = next(left)
     return found
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _check_rate(rate: float) -> None:
+    if not 1 / _MOST_TIMES <= rate <= _MOST_TIMES:
+        raise UsageError(
+            f"--rate is {rate:g}; expected a factor above 0, at most {_MOST_TIMES}, such as 2 to"
+            " play twice as fast"
+        )
 
 
 @app.command("play", arrange=list_topics)
@@ -111,8 +128,8 @@ def play_command(
     On a terminal, space pauses and goes on, s publishes one message of a pause, and the arrows up
     and down change the rate.
     """
-    per_second("--rate", rate)
-    per_second("--hz", hz)
+    _check_rate(rate)
+    per_second("--clock" if clock else "--hz", hz)
     at_least("--queue", queue, 0, "messages")
     no_less_than_zero("--start", start)
     no_less_than_zero("--delay", delay)

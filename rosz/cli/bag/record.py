@@ -346,7 +346,7 @@ class _Progress:
         disk = os.statvfs(self._folder)
         left = disk.f_bavail * disk.f_frsize
         rate = (count - self._before[0]) / elapsed
-        flow = (size - self._before[1]) / elapsed
+        flow = max(size - self._before[1], 0) / elapsed  # a ring may shrink
         text = (
             f"{now - self._begun:6.0f} s  {count} messages ({rate:.0f}/s)"
             f"  {size / 1e6:.1f} MB ({flow / 1e6:.1f} MB/s)"
