@@ -27,9 +27,11 @@ from rosz.idl import (
     Folders,
     action_of,
     action_type,
+    class_name,
     full_name,
     identity,
     is_service,
+    is_service_message,
     split_definitions,
 )
 from rosz.idl.cache import SourceCache
@@ -286,11 +288,14 @@ class TypeStore:
         return cls
 
     def _check_name(self, name: str, kind: Kind) -> str:
-        """Return the full name of a type of a kind, or of what is made of an action."""
+        """Return the full name of a type of a kind, or of what is made of an action or service."""
         match = _NAME.fullmatch(name)
-        if match is None or match[2] not in (None, kind, "action"):
-            raise TypeNotFound(name, f"expected a name such as 'package/Type' of a {kind}")
-        return f"{match[1]}/{match[2] or kind}/{match[3]}"
+        if match is not None:
+            full = f"{match[1]}/{match[2] or kind}/{match[3]}"
+            place = "msg" if is_service_message(full) else match[2]
+            if place in (None, kind, "action"):
+                return full
+        raise TypeNotFound(name, f"expected a name such as 'package/Type' of a {kind}")
 
     def _why_not(self, package: str, kind: Kind, base: str) -> str:
         bases = self._bases(package, kind)
@@ -506,11 +511,11 @@ class _TextTypes:
         module = self._compiler.load(
             f"rosz.msgs.{package}.{kind}.{stem}",
             stem,
-            [base],
+            [class_name(name)],
             self.find,
             lambda: module_source([name], self._catalog, _injected),
         )
-        return getattr(module, base)
+        return getattr(module, class_name(name))
 
 
 def is_generated(file: str) -> bool:

@@ -12,6 +12,7 @@ they wait in Zenoh's channels. Topics with large messages share half of the boun
 
 from __future__ import annotations
 
+import re
 import threading
 from collections import Counter, deque
 from collections.abc import Callable
@@ -22,6 +23,7 @@ from rosz.bags.bag import Channel, Payload
 from rosz.bags.buffer import ROW_BYTES, Buffer, Channels
 from rosz.bags.recording import Selection, Sink, Track
 from rosz.errors import BagError, ClosedError, MessageError, RoszError
+from rosz.idl import is_service_message
 from rosz.node import Subscription
 from rosz.node.type_description import request_definition
 from rosz.qos import QoS
@@ -41,6 +43,8 @@ _TOKEN_TIMEOUT = 1.0
 _DEFINITION_TIMEOUT = 10.0
 _CLOSE_TIMEOUT = 600.0
 _RULE = "=" * 80
+_LONG_NAME = re.compile(r"(\w+)/(?:msg|srv)/(\w+)")
+"""A name as ROS 2 describes the events of services; readers of bags know ``package/Name`` only."""
 
 _Row = tuple[int, Payload, int | None, int]
 """Stamp, payload, time of sending, sequence number."""
@@ -308,6 +312,8 @@ class Recorder:
         texts = [found.text]
         texts += [f"{_RULE}\nMSG: {name}\n{text}" for name, text in found.others.items()]
         text = "\n".join(texts)
+        if is_service_message(found.name):
+            text = _LONG_NAME.sub(r"\1/\2", text)
         try:
             md5 = self._node.context.types.message_from_text(found.name, text)._md5sum
         except RoszError as error:

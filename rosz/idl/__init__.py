@@ -29,7 +29,7 @@ from rosz.idl.hashes import (
     service_md5,
     service_parts,
 )
-from rosz.idl.names import action_of, is_service
+from rosz.idl.names import action_of, class_name, is_service, is_service_message
 from rosz.idl.spec import ActionSpec, Constant, Field, FieldType, MessageSpec, ServiceSpec
 
 PUBLIC_MODULES = ("cache", "generate")
@@ -47,11 +47,13 @@ __all__ = (
     "action_hash",
     "action_of",
     "action_type",
+    "class_name",
     "describe",
     "describe_field",
     "full_name",
     "identity",
     "is_service",
+    "is_service_message",
     "message_hash",
     "message_md5",
     "parse_action",

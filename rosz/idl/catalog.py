@@ -10,7 +10,7 @@ import msgspec
 
 from rosz.errors import DefinitionError, TypeNotFound, near_miss
 from rosz.idl.grammar import parse_action, parse_message, parse_service
-from rosz.idl.names import action_of, is_service
+from rosz.idl.names import action_of, is_service, is_service_message
 from rosz.idl.spec import PRIMITIVES, ActionSpec, Field, MessageSpec, ServiceSpec
 
 __all__ = (
@@ -171,7 +171,7 @@ class Catalog:
         if is_service(name):
             service = self.service(name)
             return [service.request, service.response]
-        if kind == "msg" or action_of(base) != base:
+        if kind == "msg" or action_of(base) != base or is_service_message(name):
             return [self.message(name)]
         action = self.action(name)
         return [action.goal, action.result, action.feedback]

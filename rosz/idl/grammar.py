@@ -12,6 +12,7 @@ import re
 from typing import NoReturn
 
 from rosz.errors import DefinitionError
+from rosz.idl.names import is_service_message
 from rosz.idl.spec import (
     PRIMITIVES,
     ActionSpec,
@@ -261,7 +262,9 @@ class _Line:
             return f"{self._package}/msg/{written}"
         if len(parts) == 2:  # noqa: PLR2004  # package/Name
             return f"{parts[0]}/msg/{parts[1]}"
-        if len(parts) == 3 and parts[1] in ("msg", "action"):  # noqa: PLR2004  # package/msg/Name
+        if len(parts) == 3 and (  # noqa: PLR2004  # package/msg/Name
+            parts[1] in ("msg", "action") or is_service_message(written)
+        ):
             return written
         return self._fail("expected a type such as 'pkg/Name' or 'pkg/msg/Name'", start)
 

@@ -18,6 +18,7 @@ __all__ = (
     "attribute",
     "class_name",
     "is_service",
+    "is_service_message",
 )
 
 ACTION_MESSAGES = ("Goal", "Result", "Feedback", "FeedbackMessage")
@@ -26,6 +27,8 @@ ACTION_MESSAGES = ("Goal", "Result", "Feedback", "FeedbackMessage")
 ACTION_SERVICES = ("SendGoal", "GetResult")
 """The services that ROS 2 makes of an action."""
 
+SERVICE_MESSAGES = ("Request", "Response", "Event")
+"""The messages that ROS 2 makes of a service, behind its name and ``_``."""
 
 _RESERVED = re.compile(r"[befhkmnpq][0-9]*")
 """Names that generated code uses for its own variables."""
@@ -58,7 +61,15 @@ def is_service(name: str) -> bool:
     """Return whether a full name is that of a service, such as one of the two of an action."""
     _, kind, base = name.split("/")
     part = base.removeprefix(f"{action_of(base)}_")
-    return kind == "srv" or (kind == "action" and part in ACTION_SERVICES)
+    return (kind == "srv" and not is_service_message(name)) or (
+        kind == "action" and part in ACTION_SERVICES
+    )
+
+
+def is_service_message(name: str) -> bool:
+    """Return whether a full name is that of a message that ROS 2 makes of a service."""
+    _, kind, base = name.split("/")
+    return kind == "srv" and base.rpartition("_")[2] in SERVICE_MESSAGES and "_" in base
 
 
 class LocalNames:

@@ -15,6 +15,7 @@ from rosz.idl import (
     describe,
     describe_field,
     is_service,
+    is_service_message,
     message_hash,
     service_hash,
     service_parts,
@@ -68,7 +69,8 @@ class TypeDefinition(msgspec.Struct, frozen=True):
 def request_definition(node: NodeCore, entity: Token, timeout: float = 10.0) -> TypeDefinition:
     """Request the definition of an entity's type from the node that the entity belongs to.
 
-    Nodes of rosz and of ROS 2 Jazzy or later have it; those of ROS 2 Humble do not.
+    Nodes of rosz and of ROS 2 Jazzy or later have it; those of ROS 2 Humble do not. They have no
+    text of what ROS 2 makes of a service, such as its events, but describe the fields.
 
     Args:
         node: The node that requests it.
@@ -89,6 +91,8 @@ def request_definition(node: NodeCore, entity: Token, timeout: float = 10.0) -> 
         for source in response.type_sources
         if source.encoding in _TEXTS
     }
+    if is_service_message(name):
+        texts = _lines_of(response.type_description)
     if name not in texts:
         raise TypeNotFound(name, f"node '{entity.node_name}' sent no text of its definition")
     return TypeDefinition(name, texts.pop(name), texts)
@@ -199,7 +203,11 @@ def _has_types(action: type[Action], entities: Iterable[Token]) -> bool:
 
 def _request_lines(node: NodeCore, entity: Token, timeout: float) -> dict[str, str]:
     """Return the definition of an entity's type, and of all types in it, by their names."""
-    found = _request(node, entity, timeout, sources=False).type_description
+    return _lines_of(_request(node, entity, timeout, sources=False).type_description)
+
+
+def _lines_of(found: TypeDescription) -> dict[str, str]:
+    """Return the definitions that a description amounts to, by the names of the types."""
     lines = {}
     for one in (found.type_description, *found.referenced_type_descriptions):
         fields = ((field.name, field.type) for field in one.fields)
