@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import re
 import shutil
 import subprocess
 from functools import cache
@@ -21,6 +22,7 @@ __all__ = ("LISTENER", "SERVER", "TALKER", "World", "roscpp")
 _PROGRAMS = Path(__file__).parent / "programs"
 _GENCPP = Path("/usr/lib/gencpp/gen_cpp.py")
 _GENCPP_TEMPLATES = Path("/usr/share/gencpp")
+_DYNAMIC_RECONFIGURE = Path("/usr/share/dynamic_reconfigure")
 _CACHE = Path(__file__).parents[3] / ".pytest_cache" / "d" / "roscpp"
 
 TALKER = """
@@ -80,7 +82,8 @@ def roscpp(
         name: Name of the program.
         packages: Packages of ROS 1 that it uses, beside roscpp.
         folder: Where its source is.
-        interfaces: Package of its own messages and services, of a name equal to the program's.
+        interfaces: Package of its own messages, services and ``.cfg`` files, of a name equal to the
+            program's.
         options: Further options for the compiler.
     """
     if shutil.which("g++") is None or shutil.which("pkg-config") is None:
@@ -91,12 +94,16 @@ def roscpp(
         pytest.skip(f"needs C++ libraries of Debian: {flags.stderr.strip()}")
     source = folder / f"{name}.cpp"
     files = [] if interfaces is None else sorted(interfaces.glob("*/*.[ms][sr][gv]"))
+    settings = [] if interfaces is None else sorted(interfaces.glob("cfg/*.cfg"))
     if files and not _GENCPP.exists():
         pytest.skip("needs gencpp (Debian: python3-gencpp)")
+    if settings and not is_installed("dynamic_reconfigure"):
+        pytest.skip("needs dynamic_reconfigure (Debian: python3-dynamic-reconfigure)")
     versions = subprocess.check_output(["pkg-config", "--modversion", *ask[3:]])
     versions += subprocess.check_output(["g++", "-dumpfullversion"])
     content = source.read_bytes() + versions + flags.stdout.encode()
-    content += b"".join(file.read_bytes() for file in files)
+    included = [folder / part for part in re.findall(r'#include "(\w+\.cpp)"', source.read_text())]
+    content += b"".join(file.read_bytes() for file in (*files, *settings, *included))
     _CACHE.mkdir(parents=True, exist_ok=True)
     made = _CACHE / f"{name}-{hashlib.sha256(content).hexdigest()[:16]}"
     with (_CACHE / f"{name}.lock").open(
@@ -109,6 +116,10 @@ def roscpp(
             for file in files:
                 generate = [PYTHON, str(_GENCPP), str(file), "-p", name, "-o", str(include / name)]
                 subprocess.run([*generate, "-e", str(_GENCPP_TEMPLATES)], check=True)
+            for file in settings:
+                places = [str(include / part) for part in ("docs", name, "python")]
+                generate = [PYTHON, str(file), str(_DYNAMIC_RECONFIGURE), *places]
+                subprocess.run(generate, check=True, cwd=include)
             compiled = ["g++", "-O0", *options, f"-I{include}", "-o", str(new), str(source)]
             subprocess.run([*compiled, *flags.stdout.split()], check=True)
             new.rename(made)
