@@ -1,4 +1,4 @@
-"""What to use instead of the programs, packages and modules of ROS that rosz does not have.
+"""Replacements for the programs, packages and modules of ROS that rosz does not have.
 
 Shells, ``rosz run``, launch files and imports find here what they say of such a name.
 """

@@ -32,7 +32,7 @@ _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _LINE = re.compile(r"\S+ +(?:WARN|ERROR) .*?zenoh_link_tls\S*: (?P<reason>.*)")
 _MISLEADING = re.compile(r"\.? Hint: .*")
 _REVOKED = "NameConstraintViolation"
-"""What TLS says of a certificate with a name that the authority excludes."""
+"""The word in TLS's error for a certificate with a name that the authority excludes."""
 _PROBE = "tls handshake eof"
 """A peer has only probed the port, as a peer with keys does first."""
 _NUMBER = re.compile(r"\d+")

@@ -1,4 +1,4 @@
-"""What ``rosz core --as`` adds to a core: a namespace for this machine beyond it."""
+"""The namespace that ``rosz core --as`` gives this machine beyond it."""
 
 from __future__ import annotations
 

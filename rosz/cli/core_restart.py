@@ -28,7 +28,7 @@ _CALM_SECONDS = 600.0
 
 
 class Handover(msgspec.Struct):
-    """What a core hands over to itself.
+    """The state that a core hands over to the process that replaces it.
 
     Attributes:
         why: Reason of the restart; empty if it is the first start.

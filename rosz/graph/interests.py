@@ -1,4 +1,4 @@
-"""What is followed of a graph: the tokens of key expressions, and the thread that applies them."""
+"""The followed parts of a graph: tokens of key expressions, and the thread that applies them."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class Interests:
     def query(self, interests: Sequence[Interest], keys: Iterable[str], timeout: float) -> View:
         """Return what is known of some interests, with what a query for some keys adds."""
         timeout = clamp_timeout(timeout)
-        # What a watch is told of while the query runs is missing in the replies.
+        # A token that a watch receives while the query runs may be missing in the replies.
         self.wait_until(lambda: all(one.settled for one in interests), time.monotonic() + timeout)
         found = [token for key in keys for token in self._session.live_tokens(key, timeout)]
         self._apply_pending(timeout)

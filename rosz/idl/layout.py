@@ -1,4 +1,4 @@
-"""What the code generator knows about offsets and layouts.
+"""Offsets and layouts, as far as the code generator knows them.
 
 XCDR1 aligns a primitive to its own size, at most 8, counted from the first byte after the header. A
 :class:`Phase` is what is known about an offset modulo a power of two: little behind a string,

@@ -244,7 +244,7 @@ class _Filler:
 _M = TypeVar("_M", bound=Message)
 
 _NO_YAML = (yaml.YAMLError, ValueError, AttributeError, RecursionError)
-"""What PyYAML raises: its own errors, and those of the constructors that it calls."""
+"""The errors that PyYAML raises: its own, and those of the constructors that it calls."""
 
 Now: TypeAlias = "TimeValue | Callable[[], TimeValue]"
 """The meaning of ``now``: a time, or a function that returns it."""

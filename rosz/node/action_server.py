@@ -220,7 +220,7 @@ class ActionServer:
         with self._lock:
             return [goal for goal in self._goals.values() if not goal.done]
 
-    # What clients ask for.
+    # Requests of clients.
 
     def _receive(self, call: Call) -> None:
         goal_id = bytes(call.request.goal_id.uuid)
@@ -337,7 +337,7 @@ class ActionServer:
         if response is not None:
             call.answer(response)
 
-    # What the execution of goals does.
+    # Execution of goals.
 
     def start(self, goal: ServerGoal) -> None:
         """Execute a goal that was accepted."""

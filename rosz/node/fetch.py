@@ -58,7 +58,7 @@ _SUBSCRIPTIONS = 1000
 
 
 class _Announcement(msgspec.Struct, frozen=True, array_like=True):
-    """What a publisher keeps for a subscription.
+    """The samples that a publisher keeps for a subscription.
 
     Attributes:
         zid: The session of the publisher.
@@ -76,7 +76,7 @@ class _Announcement(msgspec.Struct, frozen=True, array_like=True):
 
 
 class _Request(msgspec.Struct, frozen=True, array_like=True):
-    """What a subscription asks for.
+    """A request of a subscription for a sample.
 
     Attributes:
         sequence: The sequence number of the sample.

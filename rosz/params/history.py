@@ -58,7 +58,7 @@ def _bucket_of(path: str) -> int:
 
 
 class Differences(NamedTuple):
-    """What differs between two sets.
+    """The differences between two sets.
 
     Attributes:
         lacking: Writes that the other set lacks.
@@ -74,7 +74,7 @@ class Differences(NamedTuple):
 
 
 class Merge(NamedTuple):
-    """What `History.merge` did.
+    """The result of `History.merge`.
 
     Attributes:
         new: Writes that were added.

@@ -44,7 +44,7 @@ class _Expected(msgspec.Struct, frozen=True):
 
 
 class AdvertiseTest(unittest.TestCase):
-    """What the parameters ``~topics`` and ``~services`` list is advertised, or is not."""
+    """Checks that the topics and services of two parameters are advertised, or are not."""
 
     def setUp(self) -> None:
         """Read the parameters."""

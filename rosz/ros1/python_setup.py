@@ -35,7 +35,7 @@ class Offered(msgspec.Struct, frozen=True):
 
 
 class _Read(msgspec.Struct, frozen=True):
-    """What was read of a setup.py that had this time of change and size."""
+    """The contents of a setup.py with this time of change and size."""
 
     changed: int
     size: int
@@ -99,7 +99,7 @@ class Offers:
 
     @cached_property
     def _offered(self) -> dict[str, Offered]:
-        """What each package offers, by its name."""
+        """The modules that each package offers, by its name."""
         kept = self._kept()
         found: dict[str, Offered] = {}
         fresh: dict[str, _Read] = {}

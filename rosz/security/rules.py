@@ -35,7 +35,7 @@ _FLAGS: Final = ("get", "control")
 
 
 class Permit(msgspec.Struct, frozen=True, kw_only=True):
-    """What one holder of a key may do.
+    """The permissions of the holder of a key.
 
     Attributes:
         publish: The topics it may publish, as patterns of global names.

@@ -74,7 +74,7 @@ _LOCAL_QUEUE = {
         "drop": {"wait_before_drop": 50_000, "max_wait_before_drop_fragments": 150_000}
     },
 }
-"""What waits for a link of this machine. 16 batches of 64 kB are the most that Zenoh allows: some
+"""The queue of a link of this machine. 16 batches of 64 kB are the most that Zenoh allows: some
 thousand small messages that are published at once, or one image.
 
 By default Zenoh drops what finds no room for a millisecond. On a busy machine, its own threads may

@@ -1,4 +1,4 @@
-"""What a session dials beyond its rendezvous, and what of it is reached.
+"""The endpoints that a session dials beyond its rendezvous, and which of them are reached.
 
 Zenoh dials for as long as a session is open, and reports nothing. So a thread compares the links of
 the session with its endpoints once a second, and logs each change. The session also replies to

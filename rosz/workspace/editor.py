@@ -29,7 +29,7 @@ _HEAD = "# Written by rosz env --editor; do not edit.\n"
 
 
 class Stubs(msgspec.Struct, frozen=True):
-    """What was written.
+    """The stubs that were written.
 
     Attributes:
         folder: The folder, for the path of editors and type checkers.

@@ -97,7 +97,7 @@ class Program(msgspec.Struct, frozen=True):
 
 
 class Migration(msgspec.Struct, frozen=True):
-    """What of a workspace runs on rosz.
+    """The parts of a workspace that run on rosz, and those that do not.
 
     Attributes:
         packages: Number of packages.
@@ -186,7 +186,7 @@ class _Source(msgspec.Struct, frozen=True):
 
 
 class _Imports:
-    """What can be imported.
+    """The modules that can be imported.
 
     Args:
         index: All known packages.

@@ -122,7 +122,7 @@ class _Direction:
 
     def _name(self, kind: Kind, name: str) -> str | None:
         inside = name if self._outward else self._plan.inside(name)
-        # What is offered on the machine leaves it, as does what is wanted beyond it.
+        # Offers on the machine leave it, and so do interests from beyond it.
         leaves = (kind in _OFFERS) is self._outward
         if inside is None:
             return None

@@ -120,7 +120,7 @@ def _shorten(found: dict[bytes, Any]) -> None:
 
 
 class Edit:
-    """What changes in the samples of one topic as they pass.
+    """The changes to the samples of one topic as they pass.
 
     Args:
         ids: The ids of publishers on the other side.
@@ -178,7 +178,7 @@ class TopicRelay:
         self._sent: dict[bytes, int] = {}
         self._key = source_key
         self._damaged = False
-        # What is reliable waits for the link, on the thread of this relay alone.
+        # A reliable sample waits for the link, on the thread of this relay alone.
         self._publisher = target.publisher(target_key, reliable=qos.reliable, block=qos.reliable)
         depth = _DEEPEST if qos.history == "keep_all" else min(max(qos.depth, _DEPTH), _DEEPEST)
         self._subscriber = source.pull_subscriber(source_key, depth, remote_only=True)

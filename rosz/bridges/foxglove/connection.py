@@ -219,7 +219,7 @@ class Connection:
         for number in list(self._published):
             self._shared.topics.unadvertise((self, number))
 
-    # What the bridge publishes.
+    # Channels of the bridge.
 
     def _subscribe(self, message: protocol.Subscribe) -> None:
         for wanted in message.subscriptions:
@@ -257,7 +257,7 @@ class Connection:
         self._shared.topics.unsubscribe(feed)
         self._outbox.drop(feed)
 
-    # What the client publishes.
+    # Channels of the client.
 
     def _advertise(self, message: protocol.Advertise) -> None:
         for channel in message.channels:

@@ -200,7 +200,7 @@ class Connection:
         for part in (self._services, self._actions, self._calls, self._goals):
             part.close()
 
-    # What all operations use.
+    # Used by all operations.
 
     def _authenticate(self, operation: ops.Operation) -> None:
         """Accept a client that proves to know the password, as ROS 1's rosauth defines it."""

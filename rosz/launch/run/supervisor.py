@@ -433,7 +433,7 @@ class Supervisor:
             process.kill()
         self._end_when_over()
 
-    # What processes report
+    # Reports of processes.
 
     def waiting(self, process: Process, wait: Wait) -> None:
         """Report that a process waits before it starts."""

@@ -170,7 +170,7 @@ class Members:
 
 
 class Core:
-    """What the parts of one copy of the store share.
+    """The state that the parts of one copy of the store share.
 
     Args:
         session: Session of the copy.

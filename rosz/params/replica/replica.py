@@ -103,7 +103,7 @@ def _run(task: Callable[[], object]) -> None:
 
 
 class _Copy(TreeReader):
-    """What every copy of the store has: its state, the replicas, and synchronisation with them.
+    """A copy of the store: its state, the other replicas, and synchronisation with them.
 
     Args:
         session: Session of the copy; `close` leaves it open.

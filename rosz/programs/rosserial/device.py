@@ -1,4 +1,4 @@
-"""What a device announces: its topics and services, and the requests that need no announcement."""
+"""The topics and services that a device announces, and its requests that need no announcement."""
 
 from __future__ import annotations
 

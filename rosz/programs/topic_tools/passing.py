@@ -20,7 +20,7 @@ from rosz.qos import QoS
 __all__ = ("NONE", "Input", "Output", "base_name", "words")
 
 NONE = "__none"
-"""What stands for no topic in a mux and a demux."""
+"""The name that stands for no topic in a mux and a demux."""
 
 _DEPTH = 10
 

@@ -1,4 +1,4 @@
-"""What the types of PyKDL share: comparing, copying and arithmetic by their numbers."""
+"""The base of PyKDL's types: comparison, copies and arithmetic by their numbers."""
 
 # ruff: noqa: N802  # KDL's names
 
@@ -81,7 +81,7 @@ def checked(value: Any, kind: type[AnyValue]) -> AnyValue:
 
 
 class Value:
-    """What all types share: comparing and copying by their numbers."""
+    """The base of all types: comparison and copies by their numbers."""
 
     __hash__ = None  # type: ignore[assignment]  # they are mutable
 
@@ -122,7 +122,7 @@ class Value:
 
 
 class Linear(Value):
-    """What can be added and scaled: vectors, twists and wrenches."""
+    """The base of types that can be added and scaled: vectors, twists and wrenches."""
 
     kind = "Vector, Twist or Wrench"
 

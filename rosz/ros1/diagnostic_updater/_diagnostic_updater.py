@@ -30,7 +30,7 @@ _PERIOD_CHECK = 0.25
 
 
 class DiagnosticTask:
-    """What fills one status; subclasses override `run`.
+    """A task that fills one status; subclasses override `run`.
 
     Args:
         name: Name of the status.

@@ -20,7 +20,7 @@ __all__ = (
 
 
 class FrequencyStatusParam:
-    """What is expected by a `FrequencyStatus`.
+    """The frequencies that a `FrequencyStatus` expects.
 
     Attributes:
         freq_bound: Dictionary with the lowest frequency as ``min`` and perhaps the highest as
@@ -99,7 +99,7 @@ class FrequencyStatus(DiagnosticTask):
 
 
 class TimeStampStatusParam:
-    """What is expected by a `TimeStampStatus`.
+    """The ages of stamps that a `TimeStampStatus` expects.
 
     Attributes:
         min_acceptable: Lowest age of a stamp in seconds; negative for one in the future.

@@ -46,7 +46,7 @@ _TYPE_NAMES = "int_t, double_t, str_t or bool_t"
 
 
 class Generated(msgspec.Struct, frozen=True):
-    """What a file describes.
+    """The settings that a file describes.
 
     Attributes:
         package: Package that the file names.

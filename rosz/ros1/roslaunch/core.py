@@ -79,7 +79,7 @@ def rle_wrapper(fn: F) -> F:
     return call  # type: ignore[return-value]
 
 
-# What the launch prints, which programs may show elsewhere.
+# Output of the launch, which programs may show elsewhere.
 
 _printers: list[Callable[[str], object]] = []
 _error_printers: list[Callable[[str], object]] = []
@@ -192,7 +192,7 @@ def setup_env(
     return made
 
 
-# What a launch is made of.
+# Parts of a launch.
 
 
 class Master:

@@ -174,7 +174,7 @@ def load_from_file(file_name: str, package_context: str = "") -> tuple[str, SrvS
 
 
 Spec = msgs.MsgSpec | SrvSpec
-"""What functions of `roslib.gentools` take."""
+"""The specs that functions of `roslib.gentools` take."""
 
 
 def parts_of(spec: Any) -> list[msgs.MsgSpec]:

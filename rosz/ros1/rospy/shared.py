@@ -1,4 +1,4 @@
-"""What the publishers, or the subscribers, of one topic in a process share, as in rospy.
+"""The state that the publishers, or subscribers, of one topic in a process share, as in rospy.
 
 It is the ``impl`` of a `rospy.Publisher` or `rospy.Subscriber`, with the names that rospy's has.
 """

@@ -15,7 +15,7 @@ from rosz.ros1.rosunit.junitxml import Result, TestCaseResult, TestError, TestFa
 __all__ = ("XMLTestRunner",)
 
 Error = Any
-"""What ``sys.exc_info()`` returns, as unittest passes it on."""
+"""The value of ``sys.exc_info()``, as unittest passes it on."""
 
 
 def _seconds_since(began: float) -> float:

@@ -16,7 +16,7 @@ class WtfException(Exception):
 
 
 class WtfContext:
-    """What rules look at.
+    """The facts that rules look at.
 
     Attributes:
         env: Environment variables.

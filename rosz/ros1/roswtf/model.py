@@ -8,7 +8,7 @@ __all__ = ("WtfError", "WtfWarning")
 
 
 class _Problem:
-    """What a rule found.
+    """A finding of a rule.
 
     Attributes:
         msg: Text.
