@@ -30,7 +30,8 @@ function on a stack, or the function sees that this is set.
 _leaked: list[object] = []
 _PACKAGE = str(Path(__file__).parent)
 _POLL_SECONDS = 0.001
-_TIMEOUT = 1.0
+_TIMEOUT = 10.0
+"""Seconds; a thread of a busy machine may need more than one to leave."""
 
 
 def leak_at_exit(thing: object) -> None:
