@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -106,12 +106,16 @@ class Call:
             yield node
 
     @contextmanager
-    def session_and_survey(self, *, processes: bool = False) -> Iterator[tuple[Session, Survey]]:
-        """Open a session, and take a survey of the domain, with processes if wanted."""
+    def session_and_survey(self, nodes: Collection[str] = ()) -> Iterator[tuple[Session, Survey]]:
+        """Open a session, and take a survey of the domain with its processes.
+
+        Args:
+            nodes: Full names of the nodes that are looked for.
+        """
         from rosz.introspect.survey import take_survey
 
         with self.session() as session:
-            yield session, take_survey(session, self.domain, processes=processes)
+            yield session, take_survey(session, self.domain, nodes=nodes, processes=True)
 
     def survey(self, *, processes: bool = False, dropped: bool = False) -> Survey:
         """Return the domain, with processes and counts of dropped samples if wanted."""

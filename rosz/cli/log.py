@@ -81,8 +81,9 @@ def _set_level(call: Call, words: Sequence[str]) -> None:
 
     _, node, logger, level = words
     parse_severity(level)
-    with call.session_and_survey() as (session, survey):
-        for token in find_nodes(survey, call.resolve(node, _TOOL)):
+    name = call.resolve(node, _TOOL)
+    with call.session_and_survey([name]) as (session, survey):
+        for token in find_nodes(survey, name):
             set_level(session, token, logger, level)
 
 
@@ -92,9 +93,10 @@ def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
     if not nodes:
         raise UsageError("expected: rosz log levels NODE")
     found: dict[str, dict[str, str]] = {}
-    with call.session_and_survey() as (session, survey):
-        for node in nodes:
-            for token in find_nodes(survey, call.resolve(node, _TOOL)):
+    names = [call.resolve(node, _TOOL) for node in nodes]
+    with call.session_and_survey(names) as (session, survey):
+        for name in names:
+            for token in find_nodes(survey, name):
                 found[token.node_name] = get_levels(session, token)
     lines = (f"{one} {level}" for levels in found.values() for one, level in levels.items())
     print_result(lines, found, as_json=as_json)

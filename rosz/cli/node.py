@@ -62,8 +62,9 @@ def info_command(
     from rosz.introspect.nodes import find_nodes, format_connections, format_node
 
     rows: list[dict[str, Any]] = []
-    with call.session_and_survey(processes=True) as (session, survey):
-        chosen = [node for name in nodes for node in find_nodes(survey, call.resolve(name, _TOOL))]
+    names = [call.resolve(name, _TOOL) for name in nodes]
+    with call.session_and_survey(names) as (session, survey):
+        chosen = [node for name in names for node in find_nodes(survey, name)]
         for node in chosen:
             if json:
                 rows.append(_info_row(session, survey, node, quiet=quiet))
@@ -158,7 +159,7 @@ def _ping_often(call: Call, name: str, count: int | None) -> None:
     full = call.resolve(name, _TOOL)
     print_lines([f"rosnode: node is [{full}]"])
     times: list[float] = []
-    with until_stopped() as ready, call.session_and_survey(processes=True) as (session, survey):
+    with until_stopped() as ready, call.session_and_survey([full]) as (session, survey):
         ready()
         node = find_nodes(survey, full)[-1]
         print_lines([f"pinging {full} with a timeout of {PING_TIMEOUT}s"])
@@ -186,7 +187,7 @@ def _ping_all(call: Call) -> int:
     """Ping every node once, and return the exit code."""
     from rosz.introspect.nodes import PING_TIMEOUT
 
-    with call.session_and_survey(processes=True) as (session, survey):
+    with call.session_and_survey() as (session, survey):
         names = sorted(set(survey.view.nodes()))
         print_lines(["Will ping the following nodes: ", *(f" * {name}" for name in names), ""])
         code = 0
@@ -217,9 +218,10 @@ def kill_command(
             return 0
     from rosz.introspect.nodes import kill_nodes
 
-    with call.session_and_survey(processes=True) as (session, survey):
+    wanted = [call.resolve(name, _TOOL) for name in nodes or ()]
+    with call.session_and_survey(wanted) as (session, survey):
         known = sorted(set(survey.view.nodes()))
-        chosen = known if everybody else [call.resolve(name, _TOOL) for name in nodes or ()]
+        chosen = known if everybody else wanted
         unknown = [name for name in chosen if name not in known]
         if unknown:
             listing = ", ".join(f"'{name}'{near_miss(name, known)}" for name in unknown)

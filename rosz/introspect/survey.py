@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import TypeVar
 
 import msgspec
@@ -24,6 +24,9 @@ __all__ = ("Survey", "process_address", "take_survey")
 
 T = TypeVar("T")
 _REPLY_TIMEOUT = 2.0
+"""Seconds that a process that is stopped may delay a survey."""
+_SEARCH_TIMEOUT = 8.0
+"""Seconds for those that are named; on a busy machine they may not reply sooner."""
 _DROPPED_TIMEOUT = 1.0
 
 
@@ -70,13 +73,19 @@ def process_address(process: ProcessToken) -> str:
 
 
 def take_survey(
-    session: Session, domain: int, *, processes: bool = False, dropped: bool = False
+    session: Session,
+    domain: int,
+    *,
+    nodes: Collection[str] = (),
+    processes: bool = False,
+    dropped: bool = False,
 ) -> Survey:
     """Query the network for the nodes of a domain.
 
     Args:
         session: The session to query with.
         domain: The ROS domain.
+        nodes: Full names to look for longer if they are not found at once.
         processes: Whether to query processes as well.
         dropped: Whether to query the counts of dropped samples as well.
 
@@ -87,6 +96,10 @@ def take_survey(
     damaged: list[str] = []
     keys = session.live_tokens(tokens_key(domain), _REPLY_TIMEOUT)
     tokens = list(_read(keys, parse_token, damaged))
+    if nodes and not {token.node_name for token in tokens}.issuperset(nodes):
+        damaged.clear()
+        keys = session.live_tokens(tokens_key(domain), _SEARCH_TIMEOUT)
+        tokens = list(_read(keys, parse_token, damaged))
     found: dict[tuple[str, int], ProcessToken] = {}
     if processes:
         keys = session.live_tokens(processes_key(domain), _REPLY_TIMEOUT)

@@ -10,11 +10,13 @@ from rosz.graph import Graph, View
 from rosz.introspect.actions import view_of_action
 from rosz.introspect.services import find_server, wait_for_server
 from rosz.introspect.subscribe import wait_for_target
+from rosz.introspect.survey import take_survey
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import Context
 from rosz.node.action_server import ServerGoal
+from rosz.session import Session
 
 SEND = """
     import sys
@@ -64,3 +66,22 @@ def test_an_action_that_was_waited_for_needs_no_other_query(network: Network) ->
     network.node("robot").action_server("count", Fibonacci, execute)
     program = network.program(SEND)
     assert program.exit_code(TIMEOUT) == 0, program.output
+
+
+def test_nodes_that_reply_late_are_found_by_name(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = network.node("robot").context
+    asked: list[str] = []
+    live_tokens = Session.live_tokens
+
+    def reply_late(session: Session, key: str, timeout: float) -> list[str]:
+        asked.append(key)
+        return [] if len(asked) == 1 else live_tokens(session, key, timeout)
+
+    monkeypatch.setattr(Session, "live_tokens", reply_late)
+    survey = take_survey(context.session, context.domain, nodes=["/robot"])
+    assert survey.view.nodes() == ["/robot"]
+    assert asked[0] == asked[1]
+    take_survey(context.session, context.domain, nodes=["/robot"])
+    assert len(asked) == 3
