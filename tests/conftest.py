@@ -90,6 +90,7 @@ def patient_waits(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatc
         for wait in (Client.wait_for_service, ActionClient.wait_for_server, Subscription.get):
             monkeypatch.setattr(wait, "__defaults__", (TIMEOUT,))
         monkeypatch.setattr(Publisher.wait_for_subscribers, "__defaults__", (1, TIMEOUT))
+        monkeypatch.setattr("rosz.node.client._GRACE", TIMEOUT)  # of a call for its server
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ from rosz.msgs.geometry_msgs.msg import PointStamped
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.std_msgs.msg import Header, Int32, String
 from rosz.qos import LATCHED, QoS
+from rosz.wire import Kind
 
 from .ros1_files import STORE, write_bag
 
@@ -199,10 +200,11 @@ def test_what_was_latched_before_the_start_latches(network: Network, tmp_path: P
     network.thread(player.run)
     eventually(lambda: player.published == 3)
     late = network.node("late").subscription("/map", Int32, qos=LATCHED)
-    assert late.get(timeout=15).data == 2
-    profiles = {
-        token.name: token.qos for token in network.node("look").context.graph.refresh().tokens
-    }
+    assert late.get(timeout=TIMEOUT).data == 2
+    view = network.context().graph.wait_for(
+        lambda view: {"/map", "/a"} <= set(view.topics()), TIMEOUT, "the topics"
+    )
+    profiles = {token.name: token.qos for token in view.entities(Kind.PUBLISHER)}
     assert profiles["/map"] == LATCHED
     assert profiles["/a"] == QoS(depth=7)
     player.stop()
@@ -221,7 +223,7 @@ def test_a_pause_steps_and_goes_on(network: Network, tmp_path: Path) -> None:
     assert heard.values == [1, 1, 2, 10]
     player.change_rate(100)
     player.toggle()
-    running.join(15)
+    running.join(TIMEOUT)
     heard.wait(6)
     assert heard.values == [1, 1, 2, 10, 11, 12]
 
@@ -259,13 +261,17 @@ def test_the_clock_runs_with_the_bag(network: Network, tmp_path: Path) -> None:
     bag = _bag(tmp_path / "a.mcap", [("/a", n / 10, Int32(data=n)) for n in range(11)])
     clock = _Listener(network, "/clock", kind=Clock)
     network.node("a").subscription("/a", Int32, lambda _: None)
-    player = _player(network, bag, rate=4.0, clock=200.0)
+    player = _player(network, bag, rate=1.0, clock=200.0)
     player.run()
-    clock.wait(10)
-    stamps = [one[1].clock.to_nsec() for one in clock.found]
-    assert stamps == sorted(stamps)
-    assert START <= stamps[0] <= stamps[-1] <= START + SECOND
-    assert stamps[-1] - stamps[0] > SECOND // 2
+
+    def stamps() -> list[int]:
+        return [one[1].clock.to_nsec() for one in clock.found]
+
+    eventually(lambda: clock.found and stamps()[-1] - stamps()[0] > SECOND // 2)
+    clock.wait(4)  # or as many as a busy machine comes to in that time
+    found = stamps()
+    assert found == sorted(found)
+    assert START <= found[0] <= found[-1] <= START + SECOND
 
 
 def test_bags_of_ros1_play_as_our_types(network: Network, tmp_path: Path) -> None:
@@ -353,7 +359,7 @@ def test_a_topic_controls_the_rate(network: Network, tmp_path: Path) -> None:
         # Fewer, on a machine so busy that the time of the bag is too late before they are due.
         assert player.published <= 3 + 2 * second
     control.publish(PointStamped(header=Header(stamp=Time(sec=200))))
-    running.join(15)
+    running.join(TIMEOUT)
     heard.wait(9)
     assert heard.values == list(range(9))
 
@@ -365,7 +371,7 @@ def test_a_loop_begins_again(network: Network, tmp_path: Path) -> None:
     running = network.thread(player.run)
     heard.wait(9)
     player.stop()
-    running.join(15)
+    running.join(TIMEOUT)
     assert heard.values[:9] == [0, 1, 2] * 3
 
 
@@ -429,7 +435,7 @@ def test_the_end_of_the_node_ends_it(network: Network, tmp_path: Path) -> None:
     running = network.thread(player.run)
     eventually(lambda: player.published == 1)
     threading.Thread(target=player._node.context.close).start()
-    running.join(15)
+    running.join(TIMEOUT)
     assert not running.is_alive()
 
 

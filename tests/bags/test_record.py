@@ -49,6 +49,12 @@ with rosz.Node("custom") as node:
 """
 
 
+@pytest.fixture(autouse=True)
+def late_tokens(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have recorders wait for the tokens of publishers, however late these come."""
+    monkeypatch.setattr("rosz.bags.recorder._TOKEN_TIMEOUT", TIMEOUT)
+
+
 class Recording:
     """A recorder in this process."""
 
@@ -232,10 +238,7 @@ def test_topics_that_appear_later(network: Network) -> None:
         assert {f"/t{number}" for number in range(5)} <= {one.topic for one in reader.channels}
 
 
-def test_a_publisher_is_one_channel_from_its_first_message_on(
-    network: Network, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("rosz.bags.recorder._TOKEN_TIMEOUT", 60.0)
+def test_a_publisher_is_one_channel_from_its_first_message_on(network: Network) -> None:
     topics = [f"/t{number}" for number in range(4)]
     node, ended = network.node("talker"), threading.Event()
     publishers = [node.publisher(topic, String) for topic in topics]

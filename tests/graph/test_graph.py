@@ -14,6 +14,7 @@ from rosz.errors import ClosedError, WaitTimeout
 from rosz.graph import Graph, View
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import Empty
+from rosz.node import Context
 from rosz.wire import Kind, ProcessToken, Token
 
 VISITOR = """
@@ -173,7 +174,7 @@ def test_stopped_process_is_not_gone(network: Network, graph: Graph) -> None:
     visitor.send(signal.SIGSTOP)
     network.node("robot")
     graph.wait_for_node("/robot", TIMEOUT)
-    assert graph.view().nodes() == ["/robot", "/visitor"]
+    eventually(lambda: graph.view().nodes() == ["/robot", "/visitor"], "both nodes")
     visitor.send(signal.SIGCONT)
 
 
@@ -230,7 +231,9 @@ def test_refresh(network: Network) -> None:
     """A graph that has received no token yet can query; ended nodes do not stay in it."""
     node = network.node("robot")
     scan = node.publisher("scan", String)
-    graph = network.context().graph
+    context = network.context()
+    assert context.mesh.ready.wait(TIMEOUT)
+    graph = context.graph
     view = graph.refresh(TIMEOUT)
     assert [token.node_name for token in view.publishers("/scan")] == ["/robot"]
     assert [process.node for process in view.processes()] == ["/robot"]
@@ -246,8 +249,8 @@ def test_domains_are_separate(network: Network, graph: Graph) -> None:
     network.node("here")
     graph.wait_for_node("/here", TIMEOUT)
     context.graph.wait_for_node("/elsewhere", TIMEOUT)
-    assert graph.view().nodes() == ["/here"]
-    assert context.graph.view().nodes() == ["/elsewhere"]
+    eventually(lambda: graph.view().nodes() == ["/here"], "one node here")
+    eventually(lambda: context.graph.view().nodes() == ["/elsewhere"], "one node there")
 
 
 @pytest.mark.parametrize(
@@ -292,13 +295,16 @@ def test_processes_are_in_the_order_of_their_start() -> None:
     assert [process.started for process in View([], processes).processes("/n")] == [3, 9]
 
 
-def test_the_first_view_is_complete(network: Network) -> None:
-    """Neither the first view nor a refreshed one lacks a token."""
+def test_the_first_view_is_complete(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither the first view nor a refreshed one lacks a token, however long that takes."""
+    monkeypatch.setattr("rosz.graph.graph.COMPLETE_BY", TIMEOUT)
+    monkeypatch.setattr("rosz.graph.interests.COMPLETE_BY", TIMEOUT)
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", TIMEOUT)
     host = network.context()
     nodes = [network.node(f"n{number}", context=host) for number in range(100)]
     names = {node.name for node in nodes}
     for _ in range(5):
         context = network.context()
         assert names <= set(context.graph.view().nodes())
-        assert names <= set(context.graph.refresh().nodes())
+        assert names <= set(context.graph.refresh(TIMEOUT).nodes())
         context.close()

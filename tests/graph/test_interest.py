@@ -35,10 +35,13 @@ def test_a_node_hears_of_its_own_names_only(network: Network) -> None:
     others[0].subscription("command", String)
     eventually(lambda: "/command" in followed_names(node.context.graph), "the subscription")
     assert followed_names(node.context.graph) <= own | {"/command"}
-    assert len(node.context.graph.view().publishers("/rosout")) == 6
+    eventually(lambda: len(node.context.graph.view().publishers("/rosout")) == 6, "all logs")
 
 
-def test_what_existed_is_known_once_it_is_complete(network: Network) -> None:
+def test_what_existed_is_known_once_it_is_complete(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosz.graph.interests.COMPLETE_BY", TIMEOUT)
     host = network.context()
     node = network.node("robot", context=host)
     for _ in range(50):
@@ -68,7 +71,7 @@ def test_names_of_a_whole_domain_need_no_watch(network: Network) -> None:
     early = other.subscription("scan", String)
     node = network.node("robot")
     graph = node.context.graph
-    assert graph.view().subscriptions("/scan")
+    eventually(lambda: graph.view().subscriptions("/scan"), "the subscription")
     watches = {one.key for one in graph._interests.all() if not one.is_part}
     publishers = [node.publisher(name, String) for name in ("scan", "command")]
     assert {one.key for one in graph._interests.all() if not one.is_part} == watches

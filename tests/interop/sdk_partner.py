@@ -51,7 +51,7 @@ def serve(name: str) -> None:
 
 def call(name: str, a: int, b: int) -> None:
     kind = "example_interfaces/srv/AddTwoInts"
-    client = sdk.ROS2ServiceClient(name, kind, node_name="sdk_client", timeout=10.0, **PLACE)
+    client = sdk.ROS2ServiceClient(name, kind, node_name="sdk_client", timeout=50.0, **PLACE)
     answer: Any = client.call(a=a, b=b)
     say(sum=None if answer is None else answer.sum)
     client.close()
@@ -61,7 +61,7 @@ def types_of(node: str, names: list[str]) -> None:
     """Ask for the types of parameters: of those services the only one that the SDK can decode."""
     kind = "rcl_interfaces/srv/GetParameterTypes"
     service = f"{node}/get_parameter_types"
-    client = sdk.ROS2ServiceClient(service, kind, node_name="sdk_client", timeout=10.0, **PLACE)
+    client = sdk.ROS2ServiceClient(service, kind, node_name="sdk_client", timeout=50.0, **PLACE)
     answer: Any = client.call(names=names)
     say(types=None if answer is None else list(map(int, answer.types)))
     client.close()

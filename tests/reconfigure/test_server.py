@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 import pytest
-from network import Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ParamError, ServiceError
 from rosz.msgs.dynamic_reconfigure.msg import (
@@ -223,7 +223,7 @@ def test_namespaces(network: Network, namespace: str, name: str) -> None:
     robot = Robot(node, namespace)
     assert robot.server.name == name
     assert node.params[f"{name}/steps"] == 50
-    assert name + "/set_parameters" in node.context.graph.refresh().services()
+    node.context.graph.wait_for_service(name + "/set_parameters", TIMEOUT)
 
 
 def test_two_servers_on_one_node(network: Network) -> None:
@@ -284,6 +284,7 @@ def test_closing_withdraws_the_server(network: Network) -> None:
     robot = Robot(node)
     robot.server.close()
     robot.server.close()
-    assert "/robot/set_parameters" not in node.context.graph.refresh().services()
+    name, graph = "/robot/set_parameters", node.context.graph
+    graph.wait_for(lambda view: name not in view.services(), TIMEOUT, "the end of the service")
     Robot(node)
-    assert "/robot/set_parameters" in node.context.graph.refresh().services()
+    graph.wait_for_service(name, TIMEOUT)

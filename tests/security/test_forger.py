@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from hosts.host import Host, HostProgram
-from network import eventually
+from network import TIMEOUT, eventually
 
 from rosz.security.authority import Authority
 
@@ -105,7 +105,7 @@ def test_a_plain_client_gets_no_further(pair: tuple[Host, Host], authority: Auth
     forger = laptop.program(FORGER, laptop.variables["ROSZ_KEYS"])
     forger.wait_for("odom")
     forger.say("go")
-    forger.wait_for("done", 50)
+    forger.wait_for("done", 4 * TIMEOUT)
     victim.wait_for("param /gains/p 77")
     assert robot.ask("param", "get", "/secrets/pin") == "vault-4711"
     got = [line for line in victim.lines if line.startswith(("got", "served", "param /secrets"))]

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 from interop.plain import Plain, plain_session
-from network import Network, Program
+from network import TIMEOUT, Network, Program
 
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_msgs.msg import String
@@ -137,7 +137,7 @@ def memory(victim: Program) -> int:
     """Return the memory of the victim in megabytes; it must still have its parameter."""
     before = victim.output.count("memory ")
     victim.say("")
-    victim.wait_for("memory ", 60, times=before + 1)
+    victim.wait_for("memory ", 4 * TIMEOUT, times=before + 1)
     said = [line for line in victim.output.splitlines() if line.startswith("memory ")]
     _, megabytes, value, _ = said[-1].split()
     assert value == "1"
@@ -158,7 +158,7 @@ def test_only_damaged_data(network: Network) -> None:
         print(f"{COUNT} damaged messages: grown by {grown} MB from {midway} MB")
         assert grown < MOST_GROWTH_MB
         hello = String("still").to_cdr()
-        plain.session.put(f"42/chatter/{dds_type(String._type_name)}/{String._type_hash}", hello)
+        plain.put(f"42/chatter/{dds_type(String._type_name)}/{String._type_hash}", hello)
         victim.wait_for("still here")
     assert len(victim.lines) < MOST_LINES, victim.output
     assert "Traceback" not in victim.output

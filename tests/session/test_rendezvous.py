@@ -154,7 +154,7 @@ def test_several_contexts_of_one_process(network: Network) -> None:
     ]
     one.graph.wait_for_node("/b", TIMEOUT)
     two.graph.wait_for_node("/a", TIMEOUT)
-    assert other.graph.view().nodes() == ["/c"]
+    eventually(lambda: other.graph.view().nodes() == ["/c"], "one node there")
     one.close()
     assert [node.is_shutdown for node in nodes] == [True, False, False]
     two.graph.wait_for(lambda view: view.nodes() == ["/b"], TIMEOUT, "the end of a")

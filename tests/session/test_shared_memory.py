@@ -14,7 +14,7 @@ TALKER = """
     from rosz.msgs.sensor_msgs.msg import Image
     node = rosz.Node("talker")
     images = node.publisher("images", Image, queue_size=0)
-    images.wait_for_subscribers(timeout=15)
+    images.wait_for_subscribers(timeout=50)
     for number in range(20):
         images.publish(height=number, data=bytes([number]) * 300_000)
     print("sent", flush=True)
@@ -27,7 +27,7 @@ LISTENER = """
     images = node.subscription("images", Image, queue_size=0)
     print("ready", flush=True)
     for number in range(20):
-        image = images.get(15)
+        image = images.get(50)
         assert image.height == number, f"{image.height} instead of {number}"
         assert image.data == bytes([number]) * 300_000, "damaged"
     print("shared:", ".zenoh" in pathlib.Path("/proc/self/maps").read_text(), flush=True)

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from itertools import count
 
 import pytest
-from network import Network, eventually, free_port
+from network import TIMEOUT, Network, eventually, free_port
 
 from rosz.bridges.fleet import Fleet, FleetPlan, Shared
 from rosz.errors import TransportError
@@ -95,6 +95,7 @@ def test_topics_cross_both_ways(fleet: Robots) -> None:
         order.publish(String(data=f"to {number}"))
     assert [one.get().data for one in heard] == ["from 0", "from 1"]
     assert [one.get().data for one in orders] == ["to 0", "to 1"]
+    eventually(lambda: len(heard[0].publishers()) == 1, "its token")  # may come after it
     (seen,) = heard[0].publishers()
     assert (seen.node_name, seen.type_hash) == ("/robot1/base", String._type_hash)
 
@@ -108,7 +109,8 @@ def test_the_id_of_a_publisher_is_that_of_its_token(fleet: Robots) -> None:
     publisher.wait_for_subscribers(1)
     publisher.publish(String())
     eventually(lambda: bool(infos), "the message")
-    (seen,) = fleet.laptop.context.graph.refresh().publishers("/robot1/ids")
+    view = fleet.laptop.context.graph.wait_for_topic("/robot1/ids", TIMEOUT)
+    (seen,) = view.publishers("/robot1/ids")
     assert infos == [gid(format_token(seen))]
 
 
@@ -118,8 +120,8 @@ def test_late_subscriptions_get_latched_messages(fleet: Robots) -> None:
         publisher.publish(String(data=f"news of {number}"))
     fleet.robots[1].publisher("/tf_after", String)  # crosses after all that was there before
     graph = fleet.laptop.context.graph
-    graph.wait_for_topic("/robot2/tf_after", 15)
-    assert len(graph.wait_for_topic("/robot1/news", 15).publishers("/robot1/news")) == 1
+    graph.wait_for_topic("/robot2/tf_after", TIMEOUT)
+    assert len(graph.wait_for_topic("/robot1/news", TIMEOUT).publishers("/robot1/news")) == 1
     assert not graph.refresh().publishers("/robot2/news")
     assert fleet.laptop.subscription("/robot1/news", String).get().data == "news of 0"
 
@@ -132,8 +134,8 @@ def test_services_cross_both_ways(fleet: Robots) -> None:
     )
     for node, name, answer in ((laptop, "/robot1/reset", "robot"), (robot, "/plan", "laptop")):
         client = node.client(name, Trigger)
-        client.wait_for_service(15)
-        assert client.call(Trigger.Request(), timeout=15).message == answer
+        client.wait_for_service(TIMEOUT)
+        assert client.call(Trigger.Request(), timeout=TIMEOUT).message == answer
 
 
 def test_only_what_is_shared_leaves(fleet: Robots) -> None:
@@ -141,7 +143,7 @@ def test_only_what_is_shared_leaves(fleet: Robots) -> None:
     robot.publisher("/secret", String)
     robot.publisher("/fast", String)
     graph = fleet.laptop.context.graph
-    graph.wait_for_topic("/robot2/fast", 15)
+    graph.wait_for_topic("/robot2/fast", TIMEOUT)
     names = {name for name in graph.refresh().topics() if name.startswith("/robot2/")}
     assert "/robot2/secret" not in names
     assert "/robot2/rosout" not in names

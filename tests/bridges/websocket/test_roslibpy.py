@@ -26,7 +26,7 @@ PROGRAM = """
     import roslibpy
     roslibpy.set_default_transport(sys.argv[2])
     ros = roslibpy.Ros("127.0.0.1", int(sys.argv[1]))
-    ros.run(timeout=15)
+    ros.run(timeout=50)
 
     heard = threading.Event()
     listener = roslibpy.Topic(ros, "/chatter", "std_msgs/String")
@@ -37,13 +37,13 @@ PROGRAM = """
     talker = roslibpy.Topic(ros, "/pose", "geometry_msgs/PoseStamped")
     talker.advertise()
     talker.publish({"pose": {"position": {"x": 1}}, "header": {"frame_id": "map"}})
-    heard.wait(15)
+    heard.wait(50)
     listener.unsubscribe()
 
     flip = roslibpy.Service(ros, "/flip", "std_srvs/SetBool")
-    print("flip", flip.call(roslibpy.ServiceRequest({"data": True}), timeout=15))
+    print("flip", flip.call(roslibpy.ServiceRequest({"data": True}), timeout=50))
     try:
-        flip.call(roslibpy.ServiceRequest({"data": False}), timeout=15)
+        flip.call(roslibpy.ServiceRequest({"data": False}), timeout=50)
     except Exception as error:
         print("refused", error)
 
@@ -114,7 +114,7 @@ ACTION = """
     import sys, threading
     import roslibpy
     ros = roslibpy.Ros("127.0.0.1", int(sys.argv[1]))
-    ros.run(timeout=15)
+    ros.run(timeout=50)
     client = roslibpy.ActionClient(ros, "/fib", "example_interfaces/Fibonacci")
     over = threading.Event()
     def end(result):
@@ -123,7 +123,7 @@ ACTION = """
     goal = client.send_goal(roslibpy.Goal({"order": 3}), end,
                             lambda one: print("feedback", one["sequence"]),
                             lambda error: print("failed", error))
-    over.wait(15)
+    over.wait(50)
     ros.terminate()
 """
 
@@ -150,10 +150,10 @@ ACTIONLIB = """
     import roslibpy
     from roslibpy.ros1 import actionlib
     from roslibpy.ros1.actionlib import ActionClient, Goal, SimpleActionServer
-    actionlib.DEFAULT_CONNECTION_TIMEOUT = 15
+    actionlib.DEFAULT_CONNECTION_TIMEOUT = 50
     roslibpy.set_default_transport(sys.argv[2])
     ros = roslibpy.Ros("127.0.0.1", int(sys.argv[1]))
-    ros.run(timeout=15)
+    ros.run(timeout=50)
     def states(goal):
         reached = [threading.Event() for _ in range(10)]
         goal.on("status", lambda status: reached[status["status"]].set())
@@ -173,15 +173,15 @@ ACTIONLIB = """
         goal = Goal(client, {"goal": 13})
         reached = states(goal)
         goal.send()
-        print(name, goal.wait(15)["result"], reached[3].wait(15))
+        print(name, goal.wait(50)["result"], reached[3].wait(50))
         goal = Goal(client, {"goal": -1})
         reached = states(goal)
         heard = threading.Event()
         goal.on("feedback", lambda one: one["feedback"] == 7 and heard.set())
         goal.send()
-        print(name, "feedback", heard.wait(15))
+        print(name, "feedback", heard.wait(50))
         goal.cancel()
-        print(name, goal.wait(15)["result"], reached[2].wait(15))
+        print(name, goal.wait(50)["result"], reached[2].wait(50))
         client.dispose()
     print("ready")
     sys.stdin.readline()
