@@ -52,7 +52,7 @@ def test_two_robots_and_a_laptop(world: World, tmp_path: Path, secured: bool) ->
         ROSZ_RENDEZVOUS="tcp/localhost:7448",
     )
     taken.wait_for("'/robot1' is the name of another robot, 'one', on this network", 60)
-    assert taken.exit_code(60) == 1
+    assert taken.exit_code() == 1
     robots[0].link.cut()
     eventually(lambda: not laptop.lists("/robot1/talker"), "the end of the link", 60)
     assert "data:" in robots[0].ask("topic", "echo", "-n", "1", "/chatter")

@@ -211,7 +211,7 @@ def test_published_by_a_program_that_ends(world: World) -> None:
     talker.say("1 0 2 0")
     talker.wait_for("longest")
     talker.send(signal.SIGINT)
-    talker.exit_code(60)
+    talker.exit_code()
     assert "closed '/large'" not in talker.output
     listener.wait_for("large 1", 60)
     assert heard(listener) == [0, 1]

@@ -24,7 +24,7 @@ def type_in(host: Host, command: str) -> HostProgram:
 def output_of(host: Host, command: str) -> list[str]:
     """Type a line whose command must end well, and return what it prints."""
     program = type_in(host, command)
-    code = program.exit_code(30)
+    code = program.exit_code()
     assert code == 0, f"{command}: exit code {code}\n{program.output}"
     return program.lines
 
@@ -187,7 +187,7 @@ def test_keys_and_rules(machines: tuple[Host, Host]) -> None:
     output_of(laptop, "rosz param set /gains/p 2")
     assert output_of(robot, "rosz param get /gains/p") == ["2"]
     assert output_of(laptop, "rosz param get /pin") == ["7"]
-    type_in(laptop, "rosz param set /pin 0").exit_code(30)
+    type_in(laptop, "rosz param set /pin 0").exit_code()
     assert output_of(robot, "rosz param get /pin") == ["7"]
     assert "lifts" not in base.output
 

@@ -311,7 +311,7 @@ def test_publishers(network: Network, talker: Node, listener: Node) -> None:
     network.node("other").publisher("chatter", Int32)
     graph = listener.context.graph
     graph.wait_for(lambda view: len(view.publishers("/chatter")) == 2, TIMEOUT, "publishers")
-    eventually(lambda: subscription.publishers(), "the subscription knows, too")
+    eventually(subscription.publishers, "the subscription knows, too")
     assert [token.node_name for token in subscription.publishers()] == ["/talker"]
 
 
