@@ -29,6 +29,10 @@ class Bridge:
         self.node = node
         self.server = server
 
+    def wait_for_subscription(self, topic: str) -> None:
+        """Wait until the bridge knows a subscription of a topic: it publishes to no other."""
+        self.node.context.graph.wait_for_subscribers(topic, 1, TIMEOUT)
+
     @contextmanager
     def client(self, path: str = "", **options: Any) -> Iterator[Client]:
         """Connect."""

@@ -119,6 +119,7 @@ def test_clients_publish(bridge: Bridge, client: Client) -> None:
     heard: SimpleQueue[Any] = SimpleQueue()
     node = bridge.network.node("other")
     node.subscription("up", String, heard.put)
+    bridge.wait_for_subscription("/up")
     mine = {"id": 3, "topic": "/own", "encoding": "cdr", "schemaName": "mine/msg/Number"}
     given = {**mine, "schema": "int32 number\n", "schemaEncoding": "ros2msg"}
     client.send(

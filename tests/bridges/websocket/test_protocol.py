@@ -82,6 +82,8 @@ def test_numbers_and_octets(bridge: Bridge, client: Client) -> None:
     images: SimpleQueue[Image] = SimpleQueue()
     node.subscription("scan_back", LaserScan, scans.put)
     node.subscription("image_back", Image, images.put)
+    for name in ("/scan_back", "/image_back"):
+        bridge.wait_for_subscription(name)
     client.send("advertise", topic="/scan_back", type="sensor_msgs/LaserScan")
     client.send("publish", topic="/scan_back", msg={"ranges": [1, None], "angle_min": None})
     got = scans.get(timeout=TIMEOUT)
@@ -131,6 +133,7 @@ def test_encodings(bridge: Bridge, client: Client) -> None:
 def test_parts_of_an_operation(bridge: Bridge, client: Client) -> None:
     heard: SimpleQueue[String] = SimpleQueue()
     bridge.network.node("other").subscription("up", String, heard.put)
+    bridge.wait_for_subscription("/up")
     text = json.dumps(
         {"op": "publish", "topic": "/up", "type": "std_msgs/String", "msg": {"data": "x" * 50}}
     )
@@ -195,12 +198,14 @@ def test_logs(bridge: Bridge, client: Client) -> None:
     node = bridge.network.node("talker")
     heard: SimpleQueue[Log] = SimpleQueue()
     node.subscription("/rosout", Log, heard.put)
+
+    def wait_for_listeners(count: int) -> None:
+        found = node.context.graph.view
+        eventually(lambda: len(found().subscriptions("/rosout")) == count, f"{count} listeners")
+
     for topic in ("/rosout", "/rosout_agg"):
         client.send("subscribe", topic=topic, type="rosgraph_msgs/Log")
-        client.sync()
-        eventually(
-            lambda: node.context.graph.refresh().subscriptions("/rosout")[1:], "two listeners"
-        )
+        wait_for_listeners(2)
         node.log.warning("look out %s", topic)
         got = client.receive()
         while "look out" not in got["msg"]["msg"]:
@@ -208,8 +213,10 @@ def test_logs(bridge: Bridge, client: Client) -> None:
         assert (got["topic"], got["msg"]["level"], got["msg"]["name"]) == (topic, 4, "/talker")
         assert got["msg"]["header"]["stamp"]["secs"] > 0
         client.send("unsubscribe", topic=topic)
+        wait_for_listeners(1)
     client.send("call_service", service="/rosapi/topic_type", args={"topic": "/rosout"})
     assert client.receive_op("service_response")["values"]["type"] == "rosgraph_msgs/Log"
+    bridge.wait_for_subscription("/rosout")
     client.send("advertise", topic="/rosout", type="rosgraph_msgs/Log")
     client.send("publish", topic="/rosout", msg={"level": 8, "msg": "from a page", "name": "/page"})
     log = heard.get(timeout=TIMEOUT)
@@ -217,7 +224,7 @@ def test_logs(bridge: Bridge, client: Client) -> None:
         log = heard.get(timeout=TIMEOUT)
     assert (log.level, log.msg) == (Log.ERROR, "from a page")
     client.send("subscribe", topic="/rosout", type="rcl_interfaces/msg/Log")
-    client.sync()
+    wait_for_listeners(2)
     node.log.error("again")
     got = client.receive()
     while got["msg"]["msg"] != "again":
@@ -229,6 +236,7 @@ def test_several_advertisements_of_a_topic(bridge: Bridge, client: Client) -> No
     heard: SimpleQueue[String] = SimpleQueue()
     node = bridge.network.node("other")
     node.subscription("up", String, heard.put)
+    bridge.wait_for_subscription("/up")
     for number in ("a", "b"):
         client.send("advertise", topic="/up", type="std_msgs/String", id=number)
     client.send("unadvertise", topic="/up", id="a")
