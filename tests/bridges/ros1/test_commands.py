@@ -19,7 +19,7 @@ import msgspec
 import pytest
 from cli.side_by_side.test_side_by_side import answers, recorded, report
 from cli.side_by_side.worlds import Outcome, Ros1, World
-from network import eventually, repeats
+from network import TIMEOUT, eventually, repeats
 from oracle import PYTHON
 
 pytestmark = [pytest.mark.ros1, pytest.mark.system]
@@ -27,7 +27,7 @@ pytestmark = [pytest.mark.ros1, pytest.mark.system]
 _ROOT = Path(__file__).parents[3]
 _NODES = _ROOT / "tests" / "cli" / "side_by_side" / "nodes.py"
 _RECORD = Path(__file__).with_name("commands.json")
-_TIMEOUT = 40.0
+_TIMEOUT = 2 * TIMEOUT
 _ABOUT_MASTERS = ("topic ", "service ", "node ", "param ")
 _IN_ORDER = "param delete /nowhere"
 """The last of the commands that build on those before them."""
