@@ -46,7 +46,8 @@ class Bench:
 
 
 @pytest.fixture
-def bench() -> Iterator[Bench]:
+def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    monkeypatch.setattr(log_handlers, "_DRAIN_TIMEOUT", TIMEOUT)
     bench = Bench()
     yield bench
     bench.log.close()
