@@ -111,12 +111,6 @@ def _box(place: Place, chosen: str) -> str:
 
 
 def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], label: str, number: int) -> str:
-    (x, y), *rest = path
-    drawn = f"M{x:.1f} {y:.1f}"
-    for right, down in rest:
-        middle = (x + right) / 2
-        drawn += f"C{middle:.1f} {y:.1f} {middle:.1f} {down:.1f} {right:.1f} {down:.1f}"
-        x, y = right, down
     (left, up), (right, down) = path[0], path[1]
     text = (
         f'<text data-arrow="{number}" text-anchor="middle" x="{(left + right) / 2:.1f}"'
@@ -124,9 +118,28 @@ def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], label: str, number
     )
     title = escape(", ".join(arrow.topics))
     return (
-        f'<g class="arrow"><title>{title}</title><path d="{drawn}" marker-end="url(#tip)"/>'
+        f'<g class="arrow"><title>{title}</title><path d="{_curve(path)}" marker-end="url(#tip)"/>'
         f"{text}</g>"
     )
+
+
+def _curve(path: Sequence[tuple[float, float]]) -> str:
+    """Return a path through points that is level at each, in whole pixels.
+
+    Arrows of a large picture pass many layers: their paths are most of what a browser reads.
+    """
+    x, y = map(round, path[0])
+    drawn, level = f"M{x} {y}", x
+    for right, down in path[1:]:
+        across, along = round(right) - x, round(down) - y
+        if along:
+            if level != x:
+                drawn += f"H{x}"
+            drawn += f"c{across / 2:g} 0 {across / 2:g} {along} {across} {along}"
+        x, y = x + across, y + along
+        if along:
+            level = x
+    return drawn if level == x else f"{drawn}H{x}"
 
 
 def _groups(layout: Layout) -> list[str]:

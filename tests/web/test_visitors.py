@@ -26,6 +26,7 @@ from rosz.web import Settings, open_page
 with Node("web") as node:
     server, (address, *_) = open_page(node, Settings(port=0, most_pages=int(sys.argv[1])))
     print("the page is at", address, flush=True)
+    print("aiohttp is loaded:", "aiohttp" in sys.modules, flush=True)
     sys.stdin.readline()
     server.close()
 """
@@ -39,7 +40,7 @@ class Pages:
     def __init__(self, network: Network) -> None:
         self.network = network
         self.node = network.node("robot")
-        server = network.program(SERVER, str(MOST))
+        self.server = server = network.program(SERVER, str(MOST))
         self.address = server.wait_for("the page is at", LONG).split()[-1]
 
     def observed(self) -> bool:
@@ -64,6 +65,10 @@ def refusal(address: str) -> tuple[int, str]:
         Visitor(address)
     with caught.value as error:
         return error.code, error.read().decode()
+
+
+def test_the_start_leaves_out_what_serves_no_page(pages: Pages) -> None:
+    assert pages.server.wait_for("aiohttp is loaded", LONG).endswith("False")
 
 
 def test_too_many(pages: Pages) -> None:

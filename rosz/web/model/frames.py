@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rosz.errors import DecodeError, TransformError
 from rosz.transforms import IDENTITY, Buffer, Pose, TransformListener
+from rosz.web.model.permission import Permission
 
 if TYPE_CHECKING:
     from rosz.node import Node
@@ -23,17 +24,20 @@ class Frames:
 
     Args:
         node: The node that receives them.
+        permission: What the page may do; everything without one.
 
     Attributes:
         buffer: The transforms.
+        fault: Reason why the page may not receive them; empty if it may.
         version: Number that grows with each message.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, permission: Permission | None = None) -> None:
         self.buffer: Buffer = Buffer(_LENGTH)
+        self.fault: str = "" if permission is None else permission.objection("subscribe", "/tf")
         self.version: int = 0
         self._node = node
-        self._listener = TransformListener(self.buffer, node, self._count)
+        self._listener = None if self.fault else TransformListener(self.buffer, node, self._count)
 
     def _count(self, _transforms: list[object], _publisher: bytes, *, static: bool) -> None:
         del static
@@ -90,7 +94,8 @@ class Frames:
 
     def close(self) -> None:
         """Stop receiving."""
-        self._listener.close()
+        if self._listener is not None:
+            self._listener.close()
 
 
 def read_frame(payload: bytes, type_name: str) -> str:

@@ -83,9 +83,9 @@ class System:
         self.node = node
         self.permission = permission
         self.graph: Shared[GraphWatch] = Shared(lambda: GraphWatch(node))
-        self.traffic: Shared[Traffic] = Shared(lambda: Traffic(node))
+        self.traffic: Shared[Traffic] = Shared(lambda: Traffic(node, permission))
         self.findings: Shared[Findings] = Shared(lambda: Findings(node.context.environment))
-        self.frames: Shared[Frames] = Shared(lambda: Frames(node))
+        self.frames: Shared[Frames] = Shared(lambda: Frames(node, permission))
         self.launches: Shared[Launches] = Shared(lambda: Launches(node, permission))
         self.pictures = Pictures()
         self.actions: Actions = node.keep(Actions(node, permission))

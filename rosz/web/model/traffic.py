@@ -13,6 +13,7 @@ from rosz.errors import DecodeError
 from rosz.introspect.measure import BandwidthMeter, BandwidthStats
 from rosz.introspect.subscribe import subscribe_samples
 from rosz.names import is_of_action, short_type
+from rosz.web.model.permission import Permission
 from rosz.wire import Kind, read_attachment
 
 if TYPE_CHECKING:
@@ -103,14 +104,16 @@ class Traffic:
 
     Args:
         node: The node that subscribes to them.
+        permission: What the page may do; everything without one.
 
     Attributes:
         everything: Whether to measure topics of large messages, and those of other machines.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, permission: Permission | None = None) -> None:
         self.everything: bool = False
         self._node = node
+        self._permission = permission or Permission()
         self._lock = threading.Lock()
         self._taps: dict[str, _Tap] = {}
         self._seen: tuple[Survey, bool] | None = None
@@ -135,6 +138,8 @@ class Traffic:
         found: dict[str, Token] = {}
         for token in survey.view.entities(Kind.PUBLISHER):
             if token.zid == self._node.context.session.zid or is_of_action(token.name):
+                continue
+            if self._permission.objection("subscribe", token.name):
                 continue
             if self.everything or self.is_light(survey, token):
                 found.setdefault(token.name, token)

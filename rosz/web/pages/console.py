@@ -84,6 +84,9 @@ class _Console:
     def __init__(self, system: System, wanted: Wanted) -> None:
         self._system = system
         self._frame = frame = Frame(system, "Console", "/console")
+        if objection := system.permission.objection("subscribe", "/rosout"):
+            frame.show_fault(objection)
+            return
         self._graph, self._book = frame.use(system.graph), frame.use(system.console)
         self._choice = wanted
         self._wanted = self._make_filter()

@@ -116,6 +116,7 @@ class _ScenePage:
         for look in setup.looks:
             self._show(look)
         self._look_from(None)
+        frame.show_fault(self._frames.fault)
         frame.every(_LIST_PERIOD, self._refresh_lists)
         frame.every(_PERIOD, self._refresh)
 
