@@ -38,6 +38,10 @@ _METADATA = "metadata.yaml"
 _NAME = re.compile(r"[^/\\\0.][^/\\\0]*")
 _MOST_LINES = 20
 _STOP_SECONDS = 10.0
+_SILENT_SECONDS = 10.0
+"""Seconds without a report, after which none is expected; several come in a second."""
+_FINISH_SECONDS = 60.0
+"""The same after it was told to stop: a large bag on a slow disk takes a while to finish."""
 _PIECE = 1 << 18
 
 
@@ -186,6 +190,8 @@ class BagRun:
         self.fault: str = ""
         self.bytes_per_second: float = 0.0
         self.messages_per_second: float = 0.0
+        self._heard = time.monotonic()
+        self._stopping = False
         self._before = BagReport()
         self._ended = threading.Event()
         self._lock = threading.Lock()
@@ -215,6 +221,12 @@ class BagRun:
         """Number of its process."""
         return self._process.pid
 
+    @property
+    def silent(self) -> bool:
+        """Whether it does not run on although it should, as one that was stopped by a signal."""
+        limit = _FINISH_SECONDS if self._stopping else _SILENT_SECONDS
+        return time.monotonic() - self._heard > limit and not self.ended
+
     def _send(self, line: Any) -> None:
         try:
             with self._lock:
@@ -237,6 +249,7 @@ class BagRun:
 
     def _receive(self, line: bytes) -> None:
         report = msgspec.json.decode(line, type=BagReport)
+        self._heard = time.monotonic()
         if report.said:
             self.lines.append(report.said)
         elif report.fault:
@@ -254,8 +267,18 @@ class BagRun:
             self._before = report
 
     def control(self, command: BagCommand) -> None:
-        """Control it."""
-        self._send(command)
+        """Control it. One that is silent is killed when it shall stop."""
+        if command.do == "stop" and self.silent:
+            self.fault = (
+                f"its process did not respond for {_SILENT_SECONDS:g} s and was killed; what it"
+                " recorded is in its .active file, which 'rosz bag reindex' finishes"
+                if self.order.record is not None
+                else f"its process did not respond for {_SILENT_SECONDS:g} s and was killed"
+            )
+            self._process.kill()
+        else:
+            self._stopping = self._stopping or command.do == "stop"
+            self._send(command)
 
     def wait(self, seconds: float) -> bool:
         """Wait until it has ended; return whether it has."""

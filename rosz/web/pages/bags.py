@@ -31,7 +31,7 @@ from rosz.web.pages.layout import (
     size_text,
 )
 
-__all__ = ("show_bags",)
+__all__ = ("fault_of", "show_bags")
 
 _LIST_PERIOD = 2.0
 _PERIOD = 0.25
@@ -226,7 +226,7 @@ class _Recorder:
         self._form.set_visibility(not going)
         self._going.set_visibility(going)
         _set(self._said, _said(recording))
-        _set(self._fault, recording.fault if recording is not None else "")
+        _set(self._fault, fault_of(recording))
         if recording is None:
             return
         last = recording.last
@@ -311,7 +311,7 @@ class _Transport:
         playing: BagRun | None = self._bags.playing
         going = playing is not None and not playing.ended
         self._card.set_visibility(going)
-        _set(self._fault, playing.fault if playing is not None else "")
+        _set(self._fault, fault_of(playing))
         if playing is None or not going:
             return
         last, order = playing.last, playing.order.play
@@ -466,6 +466,15 @@ def _said(recording: BagRun | None) -> str:
         last = recording.last
         return f"'{last.path}' has {last.messages} messages, {last.lost} lost."
     return recording.lines[-1] if recording.lines else ""
+
+
+def fault_of(run: BagRun | None) -> str:
+    """Return what is wrong with a recorder or player; empty if nothing is."""
+    if run is None:
+        return ""
+    if run.silent:
+        return "Its process does not respond; 'Stop' kills it."
+    return run.fault
 
 
 def _number(label: str) -> ui.number:
