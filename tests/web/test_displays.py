@@ -22,6 +22,7 @@ from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY
 from rosz.web.model import Frames, Permission, System
 from rosz.web.scene import Look, Meshes, Setup, format_setup, open_display, read_setup
+from rosz.web.scene.display import FrameDisplay
 from rosz.web.scene.drawing import Drawing
 from rosz.web.scene.poses import Trail, draw_cells, draw_wrench
 from rosz.web.scene.robot import RobotDisplay
@@ -111,6 +112,15 @@ def test_images_and_trails_of_topics_are_displayed(network: Network) -> None:
     eventually(all_drawn, "three poses")
     for one in (image, display, frames):
         one.close()
+
+
+def test_no_frame_says_what_to_start(network: Network) -> None:
+    frames = Frames(network.node("page"))
+    display = FrameDisplay(Look("tf"), frames)
+    display.refresh("")
+    assert parts(display.encoded()[0]) == []
+    assert "start a node that sends transforms" in display.fault
+    frames.close()
 
 
 def test_a_robot_with_a_prefix_has_other_frames(network: Network) -> None:

@@ -35,7 +35,7 @@ class MessageForm:
         self._box = ui.column().classes("w-full gap-0 min-w-0")
         self._text = (
             ui.textarea(label, on_change=lambda event: self._write(event.value or ""))
-            .props("outlined autogrow input-class=rosz-mono spellcheck=false")
+            .props("outlined autogrow stack-label input-class=rosz-mono spellcheck=false")
             .classes("w-full")
         )
         self._fault = ui.label("").classes("text-negative text-sm break-words w-full")

@@ -118,9 +118,11 @@ body.body--dark .rosz-graph { --graph-text: #e6eaf2; --graph-node: #22345c;
 .rosz-label { font-size: 12px; color: var(--q-dark); white-space: nowrap; pointer-events: none;
   text-shadow: 0 0 3px var(--rosz-scene), 0 0 3px var(--rosz-scene), 0 0 3px var(--rosz-scene); }
 body.body--dark .rosz-label { color: #e6eaf2; }
+.rosz-card .rosz-chart { height: 60vh; }
 .rosz-scene { height: calc(100vh - 190px); min-height: 320px; }
 @media (min-width: 600px) { .rosz-narrow { display: none !important; } }
-@media (max-width: 599px) { .rosz-scene { height: 58vh; } .rosz-wide { display: none !important; } }
+@media (max-width: 599px) { .rosz-scene { height: 58vh; } .rosz-card .rosz-chart { height: 46vh; }
+  .rosz-wide { display: none !important; } }
 """
 
 

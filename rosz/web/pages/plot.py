@@ -102,7 +102,7 @@ class _PlotPage:
                     )
                     with ui.column().classes("rosz-card w-full p-2") as self._card:
                         self._chart = ui.echart(_options()).classes("w-full")
-                        self._chart.style("height: 60vh")
+                        self._chart.classes("rosz-chart")
                         self._chart.on("chart:datazoom", lambda: self._set_paused(paused=True), [])
                         self._chart.on("chart:finished", self._note_drawn, [])
         self._show_fields()

@@ -69,7 +69,7 @@ class _Services:
                 rows=[],
                 columns=[
                     column("name", "Service"),
-                    column("type", "Type", "rosz-soft"),
+                    column("type", "Type", "rosz-soft rosz-wide"),
                     column("nodes", "Node", "rosz-wide"),
                 ],
                 row_key="name",

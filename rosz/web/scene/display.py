@@ -179,6 +179,11 @@ class FrameDisplay:
         self.status = f"{len(found)} frames"
         some = ", ".join(missing[:3]) + (" …" if len(missing) > 3 else "")  # noqa: PLR2004
         self.fault = f"not connected with '{fixed}': {some}" if missing else ""
+        if not found and not missing:
+            self.fault = (
+                "no frame is known: start a node that sends transforms, such as"
+                " robot_state_publisher or static_transform_publisher"
+            )
 
     def close(self) -> None:
         """Do nothing; the frames belong to all pages."""
