@@ -7,7 +7,7 @@ until the token of the publisher is known.
 
 Messages are taken from Zenoh at once, whatever the disk does, and wait in one buffer that is
 bounded by bytes. One thread writes them from there. While the processor is too busy to take them,
-they wait in Zenoh's channels. Topics with large messages share half of the bound for these.
+they wait in Zenoh's channels. Topics with large messages share a quarter of the bound for these.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class Recorder:
         self._counting = threading.Lock()
         self._most = buffer
         self._held_bytes = 0
-        self._channels = Channels(buffer // 2, _QOS.depth)
+        self._channels = Channels(buffer // 4, _QOS.depth)
         self._buffer: Buffer[tuple[_Source, _Row]] = Buffer(
             buffer, lambda: sink.waiting + self._held_bytes + self._channels.size
         )

@@ -479,7 +479,7 @@ def test_what_waits_for_the_disk_is_bounded(
 def test_what_waits_for_the_processor_is_bounded(
     network: Network, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Zenoh keeps no more of large messages than fit into half of --buffsize."""
+    """Zenoh keeps no more of large messages than fit into a quarter of --buffsize."""
     held, free, receive = threading.Event(), threading.Event(), Recorder._receive
 
     def wait_and_receive(recorder: Recorder, topic: str, *given: Any) -> None:
@@ -492,7 +492,7 @@ def test_what_waits_for_the_processor_is_bounded(
     node = network.node("talker")
     big = node.publisher("/big", String, qos=QoS(history="keep_all"))
     last = node.publisher("/last", String, qos=QoS(history="keep_all"))
-    with recording(network, "x", "/big", "/last", buffer=32 << 20) as made:
+    with recording(network, "x", "/big", "/last", buffer=64 << 20) as made:
         connect(big)
         connect(last)
         for number in range(40):

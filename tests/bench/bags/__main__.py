@@ -1,6 +1,8 @@
 """How fast ``rosz bag record`` records, beside Debian's rosbag and the library ``mcap``.
 
 Each line is one run: what was published, what is in the bag, CPU time and memory of the recorder.
+``--images RATE…`` runs messages of 1 MB at these rates only, for two seconds each, also for rosz
+with shared memory (``ROSZ_SHM``) and for a bare subscriber of Zenoh, which writes nothing.
 With ``--real-time``, all run before the other programs of the machine, which takes root.
 """
 
@@ -34,6 +36,8 @@ RUNS = (
     (0, 20_000, 60_000),
 )
 """Size, rate and number of messages; size 0 is a Twist."""
+SYSTEMS = ("rosz", "rosbag")
+IMAGE_SYSTEMS = ("zenoh", "rosz", "rosz, shared memory", "rosbag")
 
 
 def cpu_seconds(pid: int) -> float:
@@ -49,17 +53,39 @@ def memory(pid: int, kind: str) -> int:
     return 0
 
 
+def commands(system: str, python: str, bag: Path) -> tuple[list[str], list[str]]:
+    """Return the programs that publish and that record."""
+    talker = str(HERE / "talker.py")
+    if system == "zenoh":
+        bare = [python, str(HERE / "bare.py")]
+        return [*bare, "talker"], [*bare, "receiver", str(bag)]
+    if system == "rosbag":
+        return [python, talker, "rospy"], ["/usr/lib/rosbag/record", "/bench", "-O", str(bag)]
+    record = [python, "-m", "rosz", "bag", "record"]
+    return [python, talker, "rosz"], [*record, "/bench", "-O", str(bag)]
+
+
+def count_of(system: str, bag: Path) -> int:
+    """Return how many messages were recorded, or received by Zenoh alone."""
+    if system == "zenoh":
+        return int(bag.read_text())
+    with open_reader(bag) as reader:
+        return sum(reader.count(one) for one in reader.channels if one.topic == "/bench")
+
+
 def run(system: str, size: int, rate: int, count: int, folder: Path) -> dict[str, Any]:
     """Record one publisher."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    ours = system == "rosz"
+    ours = system != "rosbag"
     python = sys.executable if ours else "/usr/bin/python3"
     variables = dict(os.environ)
     started: list[subprocess.Popen[str]] = []
     if ours:
         variables |= {"ROS_DOMAIN_ID": "173", "ROSZ_RENDEZVOUS": f"tcp/127.0.0.1:{port}"}
+        if "shared" in system:
+            variables["ROSZ_SHM"] = "65536"
     else:
         variables |= {"ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
         variables.pop("PYTHONPATH", None)
@@ -82,12 +108,12 @@ def run(system: str, size: int, rate: int, count: int, folder: Path) -> dict[str
             start("/usr/bin/rosmaster", "--core", "-p", str(port))
             time.sleep(3)
         words = map(str, (size, rate, count))
-        talker = start(python, str(HERE / "talker.py"), "rosz" if ours else "rospy", *words)
+        bag = folder / ("x.mcap" if ours else "x.bag")
+        talking, recording = commands(system, python, bag)
+        talker = start(*talking, *words)
         assert talker.stdout is not None
         talker.stdout.readline()
-        bag = folder / ("x.mcap" if ours else "x.bag")
-        record = [python, "-m", "rosz", "bag", "record"] if ours else ["/usr/lib/rosbag/record"]
-        recorder = start(*record, "/bench", "-O", str(bag))
+        recorder = start(*recording)
         talker.stdout.readline()
         before, idle = cpu_seconds(recorder.pid), memory(recorder.pid, "VmRSS")
         kept = json.loads(talker.stdout.readline())["rate"]
@@ -95,8 +121,7 @@ def run(system: str, size: int, rate: int, count: int, folder: Path) -> dict[str
         own = memory(recorder.pid, "RssAnon")
         recorder.send_signal(signal.SIGINT)
         recorder.wait(60)
-        with open_reader(bag) as reader:
-            found = sum(reader.count(one) for one in reader.channels if one.topic == "/bench")
+        found = count_of(system, bag)
         megabytes = max(count * max(size, 52) / 1e6, 1e-9)
         bag.unlink()
     finally:
@@ -141,13 +166,22 @@ def write_alone(folder: Path) -> dict[str, float]:
     return {"rosz": round(rate), "mcap": round(other), "disk": round(disk)}
 
 
+def chosen() -> tuple[tuple[str, ...], list[tuple[int, int, int]]]:
+    """Return the systems and the runs that the command line asks for."""
+    if "--images" not in sys.argv:
+        return SYSTEMS, list(RUNS)
+    rates = [int(one) for one in sys.argv if one.isdigit()]
+    return IMAGE_SYSTEMS, [(IMAGE, rate, 2 * rate) for rate in rates]
+
+
 def main() -> None:
     prepare()
     folder = Path(tempfile.mkdtemp(prefix="rosz-bench-"))
     try:
         print(json.dumps({"1 MB messages written per second": write_alone(folder)}))
-        for size, rate, count in RUNS:
-            for system in ("rosz", "rosbag"):
+        systems, runs = chosen()
+        for size, rate, count in runs:
+            for system in systems:
                 if system == "rosbag" and not Path("/usr/lib/rosbag/record").exists():
                     continue
                 print(json.dumps(run(system, size, rate, count, folder)), flush=True)

@@ -4,6 +4,8 @@ Both play one bag of 100 000 messages in turn, to nobody and to an unmodified no
 line is one run: seconds from the start of the program to its end, CPU time, messages received.
 Then both play 5 seconds of the bag at its times, 1000 messages of each topic per second, and a line
 says by how many milliseconds the messages came late, measured from the earliest one.
+In turn with these runs, a bare publisher of Zenoh puts as many messages that are ready to one
+subscriber: seconds for that alone, without the start of a program.
 With ``--real-time``, all run before the other programs of the machine, which takes root.
 """
 
@@ -129,6 +131,16 @@ def play(
     }
 
 
+def put(network: Network) -> dict[str, Any]:
+    """Publish as many messages over nothing but Zenoh."""
+    command = [sys.executable, str(Path(__file__).with_name("bare.py")), "put", str(3 * COUNT)]
+    done = subprocess.run(
+        command, env=network.variables(), check=True, capture_output=True, text=True
+    )
+    seconds = json.loads(done.stdout.splitlines()[-1])["seconds"]
+    return {"system": "zenoh, put alone", "seconds": round(seconds, 2)}
+
+
 def main() -> None:
     prepare()
     with tempfile.TemporaryDirectory(prefix="rosz-bench-") as folder:
@@ -140,6 +152,8 @@ def main() -> None:
                 for _ in range(ROUNDS):
                     for side in (RoszSide(network), RealSide(ros)):
                         print(json.dumps(play(side, bag, heard=heard)), flush=True)
+                    if heard:
+                        print(json.dumps(put(network)), flush=True)
             for _ in range(ROUNDS):
                 for side in (RoszSide(network), RealSide(ros)):
                     print(json.dumps(play(side, bag, heard=True, timed=True)), flush=True)
