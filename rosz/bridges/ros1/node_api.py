@@ -148,10 +148,9 @@ class NodeApi:
     def _accept(self, _node: str, _: Stream, *_args: Any) -> Answer:
         return 1, "", 0
 
-    def _request_topic(self, _node: str, stream: Stream, *args: Any) -> Answer:
-        topic = args[0] if args else ""
-        if not isinstance(topic, str) or not self._shared.publishers(self._shared.here(topic)):
-            return 0, f"nobody on the network publishes [{topic!s:.200}]", 0
+    def _request_topic(self, _node: str, stream: Stream, *_args: Any) -> Answer:
+        # Who publishes is looked at when it connects: a program that is refused here does not try
+        # again, even if it is told meanwhile that there is a publisher.
         return 1, "ready", ["TCPROS", stream.local_host, self._port]
 
     def _shut_down(self, node: str, _: Stream, *args: Any) -> Answer:

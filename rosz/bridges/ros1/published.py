@@ -135,9 +135,7 @@ class PublishedTopic:
     def _connect(self) -> None:
         """Connect to the node; runs on a thread for requests."""
         shared, entry = self._shared, self.entry
-        caller = shared.name
-        if not entry.node.startswith(BRIDGE):
-            caller = shared.standing_for(Kind.SUBSCRIPTION, self._topic)
+        caller = self._caller()
         try:
             answer = call(entry.uri, "requestTopic", (caller, entry.name, [["TCPROS"]]))
             if not isinstance(answer, list) or answer[:1] != ["TCPROS"] or len(answer) < 3:  # noqa: PLR2004
@@ -159,9 +157,22 @@ class PublishedTopic:
             sock.close()
             shared.changes.submit(partial(self._failed, str(error)))
             return
-        shared.changes.submit(partial(self._connected, sock, header))
+        shared.changes.submit(partial(self._connected, sock, header, caller))
 
-    def _connected(self, sock: socket.socket, header: dict[str, str]) -> None:
+    def _caller(self) -> str:
+        """Return the node that the connection stands for."""
+        if self.entry.node.startswith(BRIDGE):
+            return self._shared.name
+        return self._shared.standing_for(Kind.SUBSCRIPTION, self._topic)
+
+    def _connected(self, sock: socket.socket, header: dict[str, str], caller: str) -> None:
+        if not self._closed and caller != self._caller():
+            # The node has gone that it was made for. Clients of actions in C++ wait for ever for a
+            # server that is another node on one topic than on the others.
+            sock.close()
+            if not self._shared.requests.offer(self._connect):
+                self._retry()
+            return
         self._end_connecting()
         codec = self._codec
         if self._closed:
@@ -174,9 +185,9 @@ class PublishedTopic:
                 sock.close()
                 self._failed(str(error))
                 return
-            if not self._shared.subscriptions(self._topic):
-                sock.close()
-                return
+        if not self._shared.subscriptions(self._topic):
+            sock.close()
+            return
         publisher = self._publisher
         latched = header.get("latching") == "1"
         if publisher is None or (latched and not publisher.qos.latched):

@@ -52,6 +52,7 @@ class SubscribedTopic:
         self._node = node
         self._shown: _Shown | None = None
         self._links: list[_Link] = []
+        self._waiting: tuple[Incoming, dict[str, str]] | None = None
         self._published = False
         self._closed = False
         self.update()
@@ -67,6 +68,9 @@ class SubscribedTopic:
         """Show the node as a subscriber while it is not connected; then adapt the queues."""
         if self._closed:
             return
+        if self._waiting is not None and self._shared.publishers(self._topic):
+            waiting, self._waiting = self._waiting, None
+            self.accept(*waiting)
         if self._links:
             depth = _depth(self._shared.publishers(self._topic))
             for link in self._links:
@@ -96,6 +100,11 @@ class SubscribedTopic:
         shared = self._shared
         source = shared.source(self.entry.name)
         publishers = shared.publishers(self._topic)
+        if not publishers:
+            # The last has just gone, and the next may come at once. What is refused or closed now
+            # may not try again: roscpp takes it for the connection to the next.
+            self._wait(incoming, header)
+            return
         try:
             codec = _choose(shared, source, publishers, header)
         except RoszError as error:
@@ -113,9 +122,17 @@ class SubscribedTopic:
         if shown is not None:
             shown.close()  # later than the link subscribes, so that publishers see no gap
 
+    def _wait(self, incoming: Incoming, header: dict[str, str]) -> None:
+        """Keep a connection until there is a publisher, or the node makes another one."""
+        before, self._waiting = self._waiting, (incoming, header)
+        if before is not None:
+            before[0].stream.end()
+
     def close(self) -> None:
         """Take the topic from the network, and end the connections."""
         self._closed = True
+        if self._waiting is not None:
+            self._waiting[0].stream.end()
         if self._shown is not None:
             self._shown.close()
         for link in list(self._links):
@@ -162,8 +179,6 @@ def _choose(shared: Shared, topic: str, publishers: list[Token], header: dict[st
     Raises:
         RoszError: There is no publisher of the type that it wants; the text says what there is.
     """
-    if not publishers:
-        raise RoszError(f"nobody on the network publishes '{topic}'")
     wanted = header.get("md5sum", ANY_TYPE)
     found: dict[str, str] = {}
     for token in publishers:

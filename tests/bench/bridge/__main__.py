@@ -1,6 +1,7 @@
 """Through the bridge to ROS 1, beside ROS 1 alone: ``python -m tests.bench.bridge [SECONDS]``.
 
-A rosz node and a rospy node send text to the same roscpp program and back, in turn. Then images go
+A rosz node and a rospy node send text to the same roscpp program and back, in turn, and bare Zenoh
+to a program of its own: what crosses goes both ways, so less than the sum cannot be. Then images go
 to a rospy subscriber, from a rosz node through the bridge and from rospy directly, at several
 rates, of which the best of each counts: a publisher that floods a busy machine takes the processor
 from the others, and rosz floods faster than rospy. The last figures are the time until 500 topics
@@ -10,12 +11,16 @@ happens.
 
 from __future__ import annotations
 
+import json
 import os
 import statistics
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
+
+import zenoh
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -53,6 +58,14 @@ for _ in range(int(sys.argv[1])):
     back.wait(10)
     times.append(time.perf_counter() - begun)
 print("median %r" % statistics.median(times))
+"""
+BARE_ECHO = """
+import sys, zenoh
+session = zenoh.open(zenoh.Config.from_json5(sys.argv[1]))
+publisher = session.declare_publisher("echoed")
+session.declare_subscriber("chatter", lambda sample: publisher.put(sample.payload))
+print("ready")
+sys.stdin.read()
 """
 COUNT = """
 import rospy, sys, time
@@ -121,22 +134,42 @@ def _number(program: Program, word: str) -> float:
     return float(line.split()[1])
 
 
+def _median(publish: Callable[[], object], back: threading.Event) -> float:
+    """Return how long it takes until something published has come back, in seconds."""
+    while not back.wait(0.1):
+        publish()
+    times = []
+    for _ in range(ROUNDS):
+        back.clear()
+        begun = time.perf_counter()
+        publish()
+        back.wait(10)
+        times.append(time.perf_counter() - begun)
+    return statistics.median(times)
+
+
 def _round_trip(node: Node) -> float:
     back = threading.Event()
     with (
         node.publisher("/chatter", String, queue_size=1) as publisher,
         node.subscription("/echoed", String, lambda _: back.set()),
     ):
-        while not back.wait(0.1):
-            publisher.publish("x")
-        times = []
-        for _ in range(ROUNDS):
-            back.clear()
-            begun = time.perf_counter()
-            publisher.publish("x")
-            back.wait(10)
-            times.append(time.perf_counter() - begun)
-    return statistics.median(times)
+        return _median(lambda: publisher.publish("x"), back)
+
+
+def _bare_round_trip(network: Network) -> float:
+    """Return the time of bare Zenoh between two processes."""
+    config = {"mode": "peer", "scouting": {"multicast": {"enabled": False}}}
+    place = {"endpoints": [f"unixsock-stream/{network.folder}/bare.sock"]}
+    echo = network.run("-c", BARE_ECHO, json.dumps(config | {"listen": place}))
+    echo.wait_for("ready", TIMEOUT)
+    back = threading.Event()
+    with zenoh.open(zenoh.Config.from_json5(json.dumps(config | {"connect": place}))) as session:
+        publisher = session.declare_publisher("chatter")
+        session.declare_subscriber("echoed", lambda _: back.set())
+        median = _median(lambda: publisher.put(b"x"), back)
+    echo.close()
+    return median
 
 
 def _image_rate(bridge: Bridge, node: Node, size: int, published: int, seconds: float) -> float:
@@ -158,15 +191,21 @@ def main(seconds: float) -> None:
     node = bridge.network.node("bench")
     echo = bridge.ros1(roscpp(), "echo")
     echo.wait_for("ready", TIMEOUT)
-    ratios = []
+    ratios, bounds = [], []
     for _ in range(REPEATS):
         through = _round_trip(node)
+        bare = _bare_round_trip(bridge.network)
         direct = _number(bridge.ros1(PYTHON, "-c", PING, str(ROUNDS)), "median")
         ratios.append(through / direct)
-        print(f"there and back: {through * 1e6:.0f} us, rospy {direct * 1e6:.0f} us")
+        bounds.append((bare + direct) / direct)
+        print(
+            f"there and back: {through * 1e6:.0f} us, rospy {direct * 1e6:.0f} us,"
+            f" bare Zenoh {bare * 1e6:.0f} us"
+        )
     print(
         f"ratio {statistics.median(ratios):.2f}, {min(ratios):.2f} to {max(ratios):.2f}"
-        f" (aim 2.5 at most); load {os.getloadavg()[0]:.1f}"
+        f" (aim 2.5 at most; rospy and bare Zenoh {statistics.median(bounds):.2f});"
+        f" load {os.getloadavg()[0]:.1f}"
     )
     echo.close()
     for size, aim in ((1_000_000, "ratio 0.5 at least"), (10_000_000, "200 MB/s at least")):

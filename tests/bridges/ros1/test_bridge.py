@@ -399,8 +399,8 @@ def _register(world: World, sock: socket.socket, topic: str) -> None:
 def test_a_topic_that_nobody_uses_costs_no_thread(world: World, node: Node) -> None:
     """A thread that waits for Zenoh wakes ten times a second."""
 
-    def watches() -> set[threading.Thread]:
-        return {one for one in threading.enumerate() if "watch" in one.name or "/many" in one.name}
+    def watches() -> int:
+        return sum("watch" in one.name or "/many" in one.name for one in threading.enumerate())
 
     view = node.context.graph.view
     with socket.create_server(("127.0.0.1", 0)) as sock:
@@ -410,7 +410,7 @@ def test_a_topic_that_nobody_uses_costs_no_thread(world: World, node: Node) -> N
         for number in range(20):
             _register(world, sock, f"/many/t{number}")
         eventually(lambda: all(view().publishers(f"/many/t{number}") for number in range(20)))
-        assert not watches() - before
+        assert watches() == before
     eventually(lambda: "/many" not in view().nodes())
 
 
@@ -523,6 +523,69 @@ def test_a_node_gets_messages_when_its_answers_are_heard(
         publisher.close()
         for method, topic in registered:
             world.call(method.replace("reg", "unreg"), "/answering", topic, uri)
+        server.shutdown()
+
+
+def test_a_subscriber_that_comes_early_waits(world: World, node: Node) -> None:
+    """Refused, roscpp may not try again."""
+    with socket.create_server(("127.0.0.1", 0)) as other, ExitStack() as stack:
+        uri = f"http://127.0.0.1:{other.getsockname()[1]}/"
+        registered = ("/early", "/later", "std_msgs/String", uri)
+        assert world.call("registerSubscriber", *registered)[0] == 1
+        header = {"topic": "/later", "callerid": "/early", "md5sum": String._md5sum}
+
+        def is_waiting() -> bool:
+            part: Any = world.bridge._mirror._parts.get(("subscriber", "/later", "/early"))
+            return part is not None and part._waiting is not None
+
+        socks = []
+        for _ in range(2):
+            sock = socket.create_connection(("127.0.0.1", world.bridge.port), TIMEOUT)
+            socks.append(stack.enter_context(sock))
+            sock.sendall(encode_header(header))
+            eventually(is_waiting)
+        first, second = socks
+        assert first.recv(4096) == b""  # the second takes its place
+        node.publisher("/later", String)
+        assert b"type=std_msgs/String" in second.recv(4096)
+        world.call("unregisterSubscriber", "/early", "/later", uri)
+
+
+def test_a_connection_stands_for_a_node_that_is_there(world: World, node: Node) -> None:
+    """A client of an action in C++ waits until all topics come from one node."""
+    first = world.network.node("first_ear")
+    first.subscription("/stood_for", String, print)
+    shared = world.bridge._shared
+
+    def has_taken_over() -> bool:
+        return [t.node_name for t in shared.subscriptions("/stood_for")] == ["/neighbour"]
+
+    class Answering(SimpleXMLRPCServer):
+        def _dispatch(self, method: str, params: Any) -> Any:
+            if method == "requestTopic" and params[0] == "/first_ear":
+                node.subscription("/stood_for", String, print)
+                first.close()
+                eventually(has_taken_over)
+            return [1, "", ["TCPROS", "127.0.0.1", listener.getsockname()[1]]]
+
+    with (
+        socket.create_server(("127.0.0.1", 0)) as listener,
+        Answering(("127.0.0.1", 0), logRequests=False) as server,
+        ExitStack() as stack,
+    ):
+        listener.settimeout(TIMEOUT)
+        world.network.thread(server.serve_forever)
+        uri = f"http://127.0.0.1:{server.server_address[1]}/"
+        registered = ("/spoken", "/stood_for", "std_msgs/String", uri)
+        eventually(lambda: shared.subscriptions("/stood_for"))
+        assert world.call("registerPublisher", *registered)[0] == 1
+        for expected in ("/first_ear", "/neighbour"):
+            sock = stack.enter_context(listener.accept()[0])
+            with sock.makefile("rb") as reader:
+                header = decode_header(reader.read(*struct.unpack("<I", reader.read(4))))
+            assert header["callerid"] == expected
+            sock.sendall(encode_header({"type": String._type, "md5sum": String._md5sum}))
+        world.call("unregisterPublisher", "/spoken", "/stood_for", uri)
         server.shutdown()
 
 
