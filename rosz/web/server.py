@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import Client, ui
+from nicegui import Client, core, ui
+from nicegui import app as pages
 
 from rosz.errors import TransportError
 from rosz.web.guard import Guard
@@ -29,15 +30,20 @@ if TYPE_CHECKING:
 
 __all__ = ("PageServer",)
 
-_START_SECONDS = 30.0
+_START_SECONDS = 120.0
 _STOP_SECONDS = 1
 _RECONNECT_SECONDS = 10.0
-"""Seconds that a page stays as it is without a link, as on a robot that drives out of reach.
-
-A ping is sent after 0.8 of them, and must be answered within 0.4: a browser that draws much in 3D
-without a graphics processor answers late.
-"""
+"""Seconds that a page stays as it is without a link, as on a robot that drives out of reach."""
+_PING_SECONDS = 5.0
+_ANSWER_SECONDS = 20.0
+"""Seconds within which a browser must answer a ping: one that draws much in 3D without a graphics
+processor, or that opens a page on a busy machine, answers late. It would lose what one fills in."""
 _LOGGERS = ("nicegui", "uvicorn.error")
+
+
+def _wait_for_answers() -> None:
+    core.sio.eio.ping_interval = _PING_SECONDS
+    core.sio.eio.ping_timeout = _ANSWER_SECONDS
 
 
 class _Server(uvicorn.Server):
@@ -102,6 +108,7 @@ class PageServer:
             reconnect_timeout=_RECONNECT_SECONDS,
             show_welcome_message=False,
         )
+        pages.on_startup(_wait_for_answers)
         config = uvicorn.Config(
             guard.protect(app, _open_pages),
             log_level="warning",

@@ -7,14 +7,25 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from network import TIMEOUT, Network, Program, eventually
+from network import TIMEOUT, Network, Program
+from network import eventually as eventually_at_once
 
-__all__ = ("LONG", "ROBOT", "THEMES", "World", "open_browser", "set_screen", "take_picture")
+__all__ = (
+    "LONG",
+    "ROBOT",
+    "SPACE",
+    "THEMES",
+    "World",
+    "eventually",
+    "open_browser",
+    "set_screen",
+    "take_picture",
+)
 
 ROBOT = """
 import math
@@ -183,14 +194,26 @@ _LAPTOP, _PHONE = (1280, 800), (390, 844)
 THEMES = (("laptop", "light"), ("phone", "dark"))
 """The screens and colors that each page is opened with."""
 LONG = 4 * TIMEOUT
-_ATTEMPT = 3.0
+_ATTEMPT = 10.0
+_LOOK_SECONDS = 0.05
+"""A browser that is asked without a pause has no time to draw."""
+_BROWSER_SECONDS = 300
+_CONNECTED = "return window.did_handshake === true && window.socket.connected"
 _CLICK = """
+if (!(window.did_handshake && window.socket.connected)) return false;
 const found = [...document.querySelectorAll('.q-btn, .q-tree__node-header-content span')]
   .filter((one) => one.innerText.trim().endsWith(arguments[0]) && one.offsetParent !== null);
 if (found.length) found.at(-1).click();
 return found.length > 0;
 """
+_PRESS = """
+if (!(window.did_handshake && window.socket.connected)) return false;
+const found = document.querySelector(`button[aria-label="${arguments[0]}"]`);
+if (found) found.click();
+return found !== null;
+"""
 _FILL = """
+if (!(window.did_handshake && window.socket.connected)) return false;
 const field = document.querySelector(arguments[0]);
 if (!field) return false;
 Object.getOwnPropertyDescriptor(Object.getPrototypeOf(field), 'value').set.call(
@@ -198,6 +221,30 @@ Object.getOwnPropertyDescriptor(Object.getPrototypeOf(field), 'value').set.call(
 field.dispatchEvent(new Event('input', {bubbles: true}));
 return true;
 """
+_KEEP_NOTIFICATIONS = """
+window.notified = new Set();
+new MutationObserver(() => {
+  for (const one of document.querySelectorAll('.q-notification')) {
+    window.notified.add(one.textContent);
+  }
+}).observe(document, {childList: true, subtree: true, characterData: true});
+"""
+"""Notifications disappear after seconds, in which a busy machine may not look at the page."""
+_SEEN = "return [document.body.innerText, ...window.notified].join('\\n')"
+_HARMLESS = re.compile(r'^INFO .*"(reloading because |connection timed out, falling back)')
+"""A page that the browser was too busy to keep connected is loaded again."""
+
+
+def _start(options: Any) -> Any:
+    """Start the browser; again if that takes longer than the minute which its driver waits."""
+    from selenium import webdriver
+    from selenium.common.exceptions import WebDriverException
+    from selenium.webdriver.chrome.service import Service
+
+    for _ in range(2):
+        with suppress(WebDriverException):
+            return webdriver.Chrome(options=options, service=Service(_DRIVER))
+    return webdriver.Chrome(options=options, service=Service(_DRIVER))
 
 
 @contextmanager
@@ -206,16 +253,19 @@ def open_browser() -> Iterator[Any]:
     if _CHROMIUM is None or _DRIVER is None:
         pytest.skip("Debian's chromium and chromium-driver are not installed")
     from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
 
     options = webdriver.ChromeOptions()
     for argument in _ARGUMENTS:
         options.add_argument(argument)
     options.binary_location = _CHROMIUM
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    browser = webdriver.Chrome(options=options, service=Service(_DRIVER))
+    browser = _start(options)
     try:
-        browser.set_page_load_timeout(60)
+        browser.set_page_load_timeout(_BROWSER_SECONDS)
+        browser.set_script_timeout(_BROWSER_SECONDS)
+        browser.execute_cdp_cmd(
+            "Page.addScriptToEvaluateOnNewDocument", {"source": _KEEP_NOTIFICATIONS}
+        )
         yield browser
     finally:
         browser.quit()
@@ -236,15 +286,49 @@ def set_screen(browser: Any, screen: str, theme: str) -> None:
 
 def take_picture(browser: Any, folder: Path, name: str) -> None:
     """Save what the browser shows."""
+    from selenium.common.exceptions import TimeoutException
+
     folder.mkdir(exist_ok=True)
-    browser.save_screenshot(str(folder / f"{name}.png"))
+
+    def attempt() -> bool:
+        with suppress(TimeoutException):  # the browser's own limit for a picture is 10 s
+            return bool(browser.save_screenshot(str(folder / f"{name}.png")))
+        return False
+
+    eventually(attempt, f"a picture of {name}")
+
+
+def eventually(condition: Callable[[], Any], what: str, timeout: float = LONG) -> None:
+    """Wait until a condition of a page holds; a page that is loaded again meanwhile is no error."""
+    from selenium.common.exceptions import (
+        JavascriptException,
+        NoSuchElementException,
+        StaleElementReferenceException,
+        TimeoutException,
+    )
+
+    not_yet = (
+        JavascriptException,
+        NoSuchElementException,
+        StaleElementReferenceException,
+        TimeoutException,
+    )
+
+    def holds() -> bool:
+        with suppress(*not_yet):
+            if condition():
+                return True
+        threading.Event().wait(_LOOK_SECONDS)
+        return False
+
+    eventually_at_once(holds, what, timeout)
 
 
 def _is_so_soon(condition: Callable[[], bool]) -> bool:
     deadline = time.monotonic() + _ATTEMPT
-    while not condition() and time.monotonic() < deadline:
-        threading.Event().wait(0.01)
-    return condition()
+    while not (found := condition()) and time.monotonic() < deadline:
+        threading.Event().wait(_LOOK_SECONDS)
+    return found
 
 
 class World:
@@ -262,48 +346,64 @@ class World:
     def open(self, path: str) -> None:
         """Open a page, and wait until what one does there reaches the server."""
         self.browser.get(self.address + path)
-        eventually(
-            lambda: self.browser.execute_script("return window.did_handshake === true"),
-            f"{path} is connected",
-            LONG,
-        )
+        eventually(lambda: self.ask(_CONNECTED), f"{path} is connected")
+
+    def ask(self, script: str, *arguments: Any) -> Any:
+        """Return what a script gives that runs in the page."""
+        return self.browser.execute_script(script, *arguments)
 
     @property
     def text(self) -> str:
         """All text that the browser shows."""
-        return str(self.browser.execute_script("return document.body.innerText"))
+        return str(self.ask("return document.body.innerText"))
 
-    def should_see(self, *texts: str) -> None:
-        """Wait until texts are on the page."""
+    def sees(self, *texts: str | re.Pattern[str]) -> bool:
+        """Return whether texts are on the page, or have been in its notifications."""
+        seen = str(self.ask(_SEEN))
+        return all(
+            text in seen if isinstance(text, str) else text.search(seen) is not None
+            for text in texts
+        )
+
+    def should_see(self, *texts: str | re.Pattern[str]) -> None:
+        """Wait until texts are on the page, or have been in its notifications."""
         for text in texts:
-            eventually(lambda text=text: text in self.text, f"'{text}' on the page", LONG)  # type: ignore[misc]
+            eventually(lambda text=text: self.sees(text), f"'{text}' on the page")  # type: ignore[misc]
 
     def click(self, text: str) -> None:
         """Click the innermost thing with a text, as soon as there is one."""
-        eventually(lambda: self.browser.execute_script(_CLICK, text), f"'{text}' to click", LONG)
+        eventually(lambda: self.ask(_CLICK, text), f"'{text}' to click")
 
-    def press(self, label: str) -> None:
-        """Click the button with an accessible name, as soon as there is one."""
-        script = """const found = document.querySelector(`button[aria-label="${arguments[0]}"]`);
-            if (found) found.click(); return found !== null"""
-        eventually(
-            lambda: self.browser.execute_script(script, label), f"the button '{label}'", LONG
-        )
+    def press(self, label: str, arrived: Callable[[], bool] = lambda: True) -> None:
+        """Click the button with an accessible name.
+
+        Args:
+            label: The name.
+            arrived: Function that returns whether the click has reached the server. If not, it is
+                repeated: a table that is drawn anew has other buttons, and one that is no more on
+                the page when the click comes does nothing.
+        """
+        self._repeat(lambda: bool(self.ask(_PRESS, label)), arrived, f"the button '{label}'")
 
     def fill(self, selector: str, text: str) -> None:
         """Write into a field in place of what is there."""
-        eventually(
-            lambda: self.browser.execute_script(_FILL, selector, text), f"a {selector}", LONG
-        )
+        eventually(lambda: self.ask(_FILL, selector, text), f"a {selector}")
 
     def click_until(self, text: str, arrived: Callable[[], bool]) -> None:
         """Click what has a text, again if the page was not yet complete the first time."""
+        self._repeat(lambda: bool(self.ask(_CLICK, text)), arrived, f"what '{text}' does")
+
+    def _repeat(self, act: Callable[[], bool], arrived: Callable[[], bool], what: str) -> None:
+        acted = False
 
         def attempt() -> bool:
-            self.browser.execute_script(_CLICK, text)
-            return _is_so_soon(arrived)
+            nonlocal acted
+            if acted and arrived():
+                return True
+            acted = act() or acted
+            return acted and _is_so_soon(arrived)
 
-        eventually(attempt, f"what '{text}' does", LONG)
+        eventually(attempt, what)
 
     def send(self, text: str, button: str, arrived: Callable[[], bool]) -> None:
         """Fill in a form and send it, again if the page was not yet complete the first time."""
@@ -313,15 +413,14 @@ class World:
             self.click(button)
             return _is_so_soon(arrived)
 
-        eventually(attempt, f"what '{text}' does", LONG)
+        eventually(attempt, f"what '{text}' does")
 
     def should_hold(self, selector: str, text: str) -> None:
         """Wait until a field holds a text."""
         value = "return document.querySelector(arguments[0])?.value ?? ''"
-        eventually(
-            lambda: text in self.browser.execute_script(value, selector), f"{text} in a field", LONG
-        )
+        eventually(lambda: text in self.ask(value, selector), f"{text} in a field")
 
     def messages(self) -> list[str]:
         """Return what is on the console of the browser, and forget it."""
-        return [f"{one['level']} {one['message']}" for one in self.browser.get_log("browser")]
+        found = [f"{one['level']} {one['message']}" for one in self.browser.get_log("browser")]
+        return [one for one in found if not _HARMLESS.search(one)]

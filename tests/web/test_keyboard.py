@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from network import Network, eventually
+from network import Network
 
 import rosz.bags
 from rosz.msgs.std_msgs.msg import String
 
-from .robot import LONG, World, open_browser
+from .robot import LONG, World, eventually, open_browser
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.system]
 
 NODE = """
 import rosz
@@ -85,7 +85,7 @@ def test_the_keyboard_chooses(world: World, path: str, part: str, address: str, 
     def choose() -> bool:
         if address in world.browser.current_url:
             return True
-        if world.browser.execute_script(_FOCUS, part):
+        if world.ask(_FOCUS, part):
             ActionChains(world.browser).send_keys(Keys.ENTER).perform()
         return False
 

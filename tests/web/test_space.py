@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from network import Network, eventually
+from network import TIMEOUT, Network
 
-from .robot import LONG, SPACE, THEMES, World, open_browser, set_screen, take_picture
+from .robot import LONG, SPACE, THEMES, World, eventually, open_browser, set_screen, take_picture
 
 pytestmark = [pytest.mark.system]
 
@@ -41,7 +41,7 @@ def world() -> Iterator[World]:
 
 def drawn(world: World) -> dict[str, int]:
     """Return the largest number of elements of each kind that the browser draws."""
-    found: dict[str, int] = world.browser.execute_script(_DRAWN)
+    found: dict[str, int] = world.ask(_DRAWN)
     return found
 
 
@@ -62,7 +62,7 @@ def test_a_robot_and_its_world_are_shown(
         eventually(complete, "all kinds of things in the view", LONG)
         take_picture(world.browser, folder, f"space-{screen}-{theme}")
         wide = "return document.documentElement.scrollWidth - window.innerWidth"
-        assert world.browser.execute_script(wide) <= 0
+        assert world.ask(wide) <= 0
         assert world.messages() == []
 
 
@@ -70,9 +70,9 @@ def pull(world: World, tool: str) -> None:
     """Take a tool, and pull with it in the middle of the view."""
     from selenium.webdriver import ActionChains
 
-    world.click(tool)
     taken = "return document.querySelector('.rosz-scene canvas').dataset.tool"
-    eventually(lambda: world.browser.execute_script(taken), f"{tool} is taken", LONG)
+    if not world.ask(taken):
+        world.click_until(tool, lambda: bool(world.ask(taken)))
     canvas = world.browser.find_element("css selector", ".rosz-scene canvas")
     keys: Any = ActionChains(world.browser, duration=20)
     keys.move_to_element_with_offset(canvas, 60, 40).click_and_hold()
@@ -86,10 +86,16 @@ def test_what_one_points_at_arrives(world: World) -> None:
     eventually(lambda: drawn(world).get("points"), "something in the view", LONG)
 
     def sent(tool: str, text: str) -> None:
-        pull(world, tool)
-        world.robot.wait_for(text, LONG)
+        def arrived() -> bool:
+            return text in world.robot.output
+
+        def attempt() -> bool:
+            pull(world, tool)
+            return world.robot.wait_until(arrived, TIMEOUT / 4)
+
+        eventually(attempt, f"what {tool} sends")
         idle = "return document.querySelector('.rosz-scene canvas').dataset.tool === ''"
-        eventually(lambda: world.browser.execute_script(idle), f"{tool} is put down", LONG)
+        eventually(lambda: world.ask(idle), f"{tool} is put down", LONG)
 
     sent("Goal", "goes to ")
     assert " map" in world.robot.output.partition("goes to ")[2].partition("\n")[0]
@@ -108,12 +114,15 @@ def test_the_view_turns_and_displays_come_and_go(world: World) -> None:
 const scene = getElement(Number(document.querySelector('.rosz-scene').id.slice(1)));
 return scene.get_camera().position;
 """
-    before = world.browser.execute_script(where)
-    canvas = world.browser.find_element("css selector", ".rosz-scene canvas")
-    ActionChains(world.browser).drag_and_drop_by_offset(canvas, 120, 30).perform()
-    eventually(lambda: world.browser.execute_script(where) != before, "another view", LONG)
-    world.browser.find_element("css selector", "[aria-label='Remove /scan']").click()
-    eventually(lambda: "points" not in drawn(world), "no scan in the view", LONG)
+    before = world.ask(where)
+
+    def turned() -> bool:
+        canvas = world.browser.find_element("css selector", ".rosz-scene canvas")
+        ActionChains(world.browser).drag_and_drop_by_offset(canvas, 120, 30).perform()
+        return bool(world.ask(where) != before)
+
+    eventually(turned, "another view")
+    world.press("Remove /scan", lambda: "points" not in drawn(world))
     eventually(lambda: "/scan" not in world.browser.current_url, "the address", LONG)
     assert "show=grid" in world.browser.current_url
     assert world.messages() == []

@@ -92,6 +92,13 @@ def test_too_many(pages: Pages) -> None:
     eventually(opens, "room for a page", LONG)
 
 
+def test_one_that_is_busy(pages: Pages) -> None:
+    """A browser that draws for seconds before it answers a ping keeps its page."""
+    one = Visitor(pages.address)
+    one.wait_for('"pingTimeout":20000')
+    one.close()
+
+
 def test_one_that_sleeps(pages: Pages) -> None:
     """A page whose browser reads nothing is closed, with what it observes; another one goes on."""
     asleep = Visitor(pages.address, "/console", awake=False)
