@@ -16,7 +16,7 @@ from typing import NamedTuple
 from xmlrpc.client import ServerProxy
 
 import pytest
-from network import Network, Program, eventually, free_port
+from network import TIMEOUT, Network, Program, eventually, free_port
 from oracle import PYTHON, require
 
 from .scenarios import Part, Scenario
@@ -26,7 +26,6 @@ __all__ = ("Outcome", "Ros", "Rosz")
 SCRIPTS = Path(__file__).parent / "scripts"
 PACKAGES = Path(__file__).parent / "packages"
 _GENPY = Path("/usr/lib/genpy")
-_TIMEOUT = 25.0
 _LOOKS = 10
 """A thread that still computes is seen at it: it sleeps for the interpreter lock only."""
 _NEEDED = (
@@ -74,14 +73,14 @@ class _Runner:
         try:
             for part in scenario.parts:
                 if part.after:
-                    running[-1].wait_for(_whole(part.after), _TIMEOUT)
+                    running[-1].wait_for(_whole(part.after), TIMEOUT)
                 variables = self.variables() | dict(part.variables)
                 running.append(Program(self.command(part), variables, folder, separate=True))
             for part, program in zip(scenario.parts, running, strict=True):
                 if part.interrupt_at:
-                    program.wait_for(_whole(part.interrupt_at), _TIMEOUT)
+                    program.wait_for(_whole(part.interrupt_at), TIMEOUT)
                     if part.waits:
-                        eventually(partial(_is_waiting, program.pid), "the wait", _TIMEOUT)
+                        eventually(partial(_is_waiting, program.pid), "the wait", TIMEOUT)
                     program.send(part.signal)
             return [_outcome(program, scenario.ignored) for program in running]
         finally:
@@ -121,7 +120,7 @@ class Ros(_Runner):
         )
         self._master = ServerProxy(self._variables["ROS_MASTER_URI"])
         try:
-            eventually(self._complete, "roscore", timeout=60)
+            eventually(self._complete, "roscore")
             self._own = set(self._parameters())
         except BaseException:  # else the roscore would stay, as an unclosed process of a later test
             self.close()
@@ -227,7 +226,7 @@ def _is_waiting(pid: int) -> bool:
 
 def _outcome(program: Program, ignored: Sequence[str]) -> Outcome:
     """Wait for the end of a program; remove lines that contain an ignored text."""
-    code = program.exit_code(_TIMEOUT)
+    code = program.exit_code(TIMEOUT)
     stdout, stderr = (
         normalize("\n".join([*lines, ""]), str(SCRIPTS), ignored)
         for lines in (program.lines, program.errors)

@@ -90,8 +90,9 @@ def test_clock_functions(printed: Printed) -> None:
         rospy.rostime.set_rostime_initialized(True)
         rospy.init_node("times")
         print(rospy.rostime.is_rostime_initialized(), rospy.rostime.is_wallclock())
-        print(abs(rospy.get_time() - time.time()) < 1)
-        print(abs(rospy.Time.now().to_sec() - time.time()) < 1)
+        before, seconds, now, after = time.time(), rospy.get_time(), rospy.Time.now(), time.time()
+        print(before - 1 < seconds < after + 1)
+        print(before - 1 < now.to_sec() < after + 1)
         print(type(rospy.get_rostime()) is rospy.Time, type(rospy.get_time()))
         began = time.monotonic()
         rospy.sleep(rospy.Duration(0.05))
@@ -117,12 +118,12 @@ def test_rate(printed: Printed) -> None:
     assert printed("""
         import time, rospy
         rospy.init_node("rates")
+        began = time.monotonic()
         rate = rospy.Rate(50)
         print(rate.sleep_dur, type(rate.last_time) is rospy.Time)
-        began = time.monotonic()
         for _ in range(10):
             rate.sleep()
-        print(0.19 <= time.monotonic() - began < 2)
+        print(time.monotonic() - began >= 0.19)
         time.sleep(0.5)
         print(rate.remaining().to_sec() < -0.4)
         rate.sleep()
@@ -146,7 +147,7 @@ def test_timers(printed: Printed) -> None:
         print(timer.is_alive())
         first, third = events[0], events[2]
         print(first.last_expected, first.last_real, first.last_duration)
-        print(type(third.last_real) is rospy.Time, third.last_duration < 1)
+        print(type(third.last_real) is rospy.Time, third.last_duration < 60)
         print((third.current_expected - third.last_expected).to_sec())
         print(third.current_real >= third.current_expected)
         once = []
@@ -220,8 +221,8 @@ def test_simulated_time(network: Network, printed: Printed) -> None:
         threading.Thread(target=tick, daemon=True).start()
         rospy.sleep(1)
         start = rospy.get_time()
-        rospy.sleep(5)
-        print(5 <= rospy.get_time() - start < 8)
+        rospy.sleep(20)
+        print(20 <= rospy.get_time() - start < 400)  # a sleep in real time would take 500
         rate = rospy.Rate(1)
         rate.sleep()
         rate.sleep()
@@ -230,7 +231,7 @@ def test_simulated_time(network: Network, printed: Printed) -> None:
         print(again.wait(60))
         def back():
             seconds[0], step[0] = 1.0, 0.0
-        threading.Timer(0.1, back).start()
+        threading.Timer(1, back).start()
         show("back", lambda: rospy.sleep(1e6))
         print(rospy.get_time())
         """)

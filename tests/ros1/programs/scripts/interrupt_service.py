@@ -9,7 +9,7 @@ rospy.init_node("slow_server")
 
 def handle(request):
     print("ready")
-    rospy.sleep(1)
+    rospy.sleep(60)
     return True, "slept"
 
 

@@ -24,7 +24,7 @@ rospy.init_node("narrator")
 publisher_seen = rospy.Subscriber("/rosout", Log, callback)
 while publisher_seen.get_num_connections() < 1:
     rospy.sleep(0.01)
-rospy.sleep(0.3)
+rospy.sleep(1)
 rospy.logdebug("unheard")
 rospy.loginfo("first")
 speak()

@@ -7,7 +7,7 @@ rospy.init_node("cacher")
 rospy.set_param("~limit", 1)
 print(rospy.get_param_cached("~limit"))
 rospy.set_param("~limit", 2)
-deadline = rospy.get_time() + 5
+deadline = rospy.get_time() + 60
 while rospy.get_param_cached("~limit") != 2 and rospy.get_time() < deadline:
     rospy.sleep(0.01)
 print(rospy.get_param_cached("~limit"))

@@ -16,7 +16,7 @@ rospy.Service("nothing", Empty, lambda request: [])
 switch = rospy.ServiceProxy("switch", SetBool)
 nothing = rospy.ServiceProxy("nothing", Empty)
 switch.wait_for_service()
-nothing.wait_for_service(timeout=10)
+nothing.wait_for_service(timeout=60)
 
 
 def attempt(what, function, *args, **kwargs):

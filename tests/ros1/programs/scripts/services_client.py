@@ -16,7 +16,7 @@ print(divide(True).message)
 print(rospy.ServiceProxy("leave", Trigger)().message)
 while True:
     try:
-        rospy.wait_for_service("divide", 0.05)
+        rospy.wait_for_service("divide", 2)
     except rospy.ROSException as error:
         print(type(error).__name__, error)
         break

@@ -22,7 +22,12 @@ print(plain().message)
 print(headers)
 proxy.close()
 service.shutdown("closing time")
-rospy.sleep(0.2)
+while True:
+    try:
+        rospy.wait_for_service("bar", 1)
+    except rospy.ROSException:
+        break
+    rospy.sleep(0.05)
 try:
     print(plain().message)
 except rospy.ServiceException as error:

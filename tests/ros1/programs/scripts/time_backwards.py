@@ -20,7 +20,7 @@ def set_clock(seconds):
 
 
 def drive():
-    rospy.rostime.wallsleep(0.2)
+    rospy.rostime.wallsleep(1)
     set_clock(50)
 
 

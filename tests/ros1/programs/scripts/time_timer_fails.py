@@ -11,5 +11,5 @@ def tick(event):
 
 
 timer = rospy.Timer(rospy.Duration(0.02), tick)
-rospy.sleep(0.3)
+timer.join(60)
 print(timer.is_alive())

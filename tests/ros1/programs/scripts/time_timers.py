@@ -25,6 +25,7 @@ timer = rospy.Timer(rospy.Duration(0.05), tick)
 single = rospy.Timer(rospy.Duration(0.01), only, oneshot=True)
 print(timer.is_alive(), timer.daemon, isinstance(timer, threading.Thread))
 rospy.spin()
+single.join(60)
 first, second = events[0], events[1]
 print(first.last_expected, first.last_real, first.last_duration)
 print(type(first.current_expected).__name__, type(first.current_real).__name__)

@@ -14,8 +14,12 @@ def divide(message):
     return 10 / message.data
 
 
+moved = []
+
+
 class Robot:
     def move(self, message, speed):
+        moved.append(message.data)
         raise ValueError("cannot move at %s" % speed)
 
 
@@ -27,9 +31,13 @@ rospy.Subscriber("speeds", Int32, Robot().move, callback_args=7)
 while publisher.get_num_connections() < 1 or other.get_num_connections() < 1:
     rospy.sleep(0.01)
 other.publish(1)
-rospy.sleep(0.3)
+while not moved:
+    rospy.sleep(0.01)
+rospy.sleep(0.5)  # the error is logged after the callback
 publisher.publish(0)
-rospy.sleep(0.3)
+while not count:
+    rospy.sleep(0.01)
+rospy.sleep(0.5)
 publisher.publish(5)
 rospy.spin()
 print("end", count)

@@ -25,7 +25,7 @@ def attempt(what, made, *args, **kwargs):
     except Exception as error:
         print(what, "->", type(error).__name__, error)
         return
-    deadline = rospy.get_time() + 5
+    deadline = rospy.get_time() + 60
     while not got and rospy.get_time() < deadline:
         rospy.sleep(0.005)
     print(what, "->", str(got[0]).replace("\n", ", ") if got else "lost")

@@ -19,7 +19,7 @@ def listed(*namespace):
 
 
 def until(count):
-    deadline = rospy.get_time() + 5
+    deadline = rospy.get_time() + 60
     while len(listed()) != count and rospy.get_time() < deadline:
         rospy.sleep(0.02)
 

@@ -27,9 +27,9 @@ def run(size):
     started.wait(60)
     for number in range(1, 11):
         publisher.publish(number)
-    rospy.sleep(0.3)
+    rospy.sleep(1)
     go.set()
-    deadline = rospy.get_time() + 5
+    deadline = rospy.get_time() + 60
     while seen[-1] != 10 and rospy.get_time() < deadline:
         rospy.sleep(0.01)
     print(size, seen)

@@ -1,25 +1,27 @@
 #!/usr/bin/env python
 """A camera at 50 Hz and a callback that takes 0.3 s: with a queue of one it never lags behind."""
 
-import threading
-
 import rospy
 from geometry_msgs.msg import PointStamped
 
-ages = []
+seen, sent = [], []
 
 
 def callback(message):
-    ages.append((rospy.Time.now() - message.header.stamp).to_sec())
-    rospy.sleep(0.3)
-    if len(ages) == 5:
+    seen.append(message.point.x)
+    if len(seen) == 5:
         rospy.signal_shutdown("enough")
+        return
+    count = len(sent)
+    while len(sent) < count + 10 and not rospy.is_shutdown():
+        rospy.sleep(0.01)
 
 
 def publish(event):
     message = PointStamped()
-    message.header.stamp = event.current_real
+    message.point.x = len(sent)
     publisher.publish(message)
+    sent.append(message)
 
 
 rospy.init_node("camera")
@@ -27,5 +29,4 @@ publisher = rospy.Publisher("image", PointStamped, queue_size=1)
 rospy.Subscriber("image", PointStamped, callback, queue_size=1, buff_size=2**24)
 timer = rospy.Timer(rospy.Duration(0.02), publish)
 rospy.spin()
-# real rospy keeps what the socket holds: one callback old at the most
-print(len(ages), all(age < 0.45 for age in ages), threading.active_count() > 0)
+print(len(seen), all(later - sooner > 5 for sooner, later in zip(seen, seen[1:])))

@@ -26,7 +26,7 @@ except Exception as error:
 publisher.unregister()
 subscriber.unregister()
 subscriber.unregister()
-deadline = rospy.get_time() + 5
+deadline = rospy.get_time() + 60
 while second.get_num_connections() > 0 and rospy.get_time() < deadline:
     rospy.sleep(0.01)
 second.publish("four")

@@ -10,9 +10,9 @@ for timeout in (0.1, 1e-9):
         rospy.wait_for_message("silence", String, timeout)
     except rospy.ROSException as error:
         print(type(error).__name__, error)
-timer = rospy.Timer(rospy.Duration(0.02), lambda event: publisher.publish(7))
 publisher = rospy.Publisher("sevens", Int32, queue_size=1)
+timer = rospy.Timer(rospy.Duration(0.02), lambda event: publisher.publish(7))
 print(rospy.wait_for_message("sevens", Int32).data)
 print(rospy.wait_for_message("/sevens", Int32, 60))
-print(rospy.wait_for_message("sevens", Int32, rospy.Duration(10).to_sec()).data)
+print(rospy.wait_for_message("sevens", Int32, rospy.Duration(60).to_sec()).data)
 timer.shutdown()
