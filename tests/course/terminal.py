@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from network import Network
+from network import TIMEOUT, Network
 
 __all__ = ("COURSE", "Desk", "Terminal", "without_times")
 
@@ -26,8 +26,7 @@ _DECORATION = re.compile(r"\x1b\][^\a]*\a|\x1b\[[\d;?]*[a-zA-Z]|\r")
 _TIMES = re.compile(r"\[\d{9,}\.\d+\]")
 _PIDS = re.compile(r"pid \[\d+\]")
 _RUN_IDS = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
-_TIMEOUT = 30.0
-_END = 5.0
+_END = 30.0
 
 
 def without_times(text: str) -> str:
@@ -78,7 +77,7 @@ class Terminal:
                 self._text += _DECORATION.sub("", data.decode(errors="replace"))
                 self._changed.notify_all()
 
-    def _until(self, condition: Callable[[], bool], what: str, timeout: float = _TIMEOUT) -> None:
+    def _until(self, condition: Callable[[], bool], what: str, timeout: float = TIMEOUT) -> None:
         deadline = time.monotonic() + timeout
         with self._changed:
             while not condition():
@@ -90,12 +89,12 @@ class Terminal:
         """Type a line, and leave what it starts running."""
         os.write(self._file, f"{line}\n".encode())
 
-    def type(self, line: str, timeout: float = _TIMEOUT) -> str:
+    def type(self, line: str, timeout: float = TIMEOUT) -> str:
         """Type a line, wait for the next prompt, and return what came in between."""
         self.start(line)
         return self.prompt(line, timeout)
 
-    def prompt(self, what: str = "the prompt", timeout: float = _TIMEOUT) -> str:
+    def prompt(self, what: str = "the prompt", timeout: float = TIMEOUT) -> str:
         """Wait for the next prompt, and return what came before it."""
         self._until(lambda: _PROMPT in self._text[self._taken :], what, timeout)
         end = self._text.index(_PROMPT, self._taken)
@@ -103,7 +102,7 @@ class Terminal:
         self._taken = end + len(_PROMPT)
         return output
 
-    def wait_for(self, text: str, times: int = 1, timeout: float = _TIMEOUT) -> str:
+    def wait_for(self, text: str, times: int = 1, timeout: float = TIMEOUT) -> str:
         """Wait until what runs has written a text so many times; return all it wrote so far."""
 
         def written() -> bool:

@@ -121,13 +121,19 @@ def test_a_length_alone_allocates_nothing(length: int) -> None:
             data = cls().to_cdr()
             for at in range(4, len(data) - 3, 4):
                 broken = data[:at] + struct.pack("<I", length) + data[at + 4 :]
-                tracemalloc.reset_peak()
-                before, _ = tracemalloc.get_traced_memory()
-                check(cls, broken)
-                _, peak = tracemalloc.get_traced_memory()
-                assert peak - before < 100_000, (name, at)
+                # Threads that other tests have left behind allocate too, but not each time.
+                assert any(allocated(cls, broken) < 100_000 for _ in range(5)), (name, at)
     finally:
         tracemalloc.stop()
+
+
+def allocated(cls: type[Message], data: bytes) -> int:
+    """Return how many bytes it takes at most to refuse a message."""
+    tracemalloc.reset_peak()
+    before, _ = tracemalloc.get_traced_memory()
+    check(cls, data)
+    _, peak = tracemalloc.get_traced_memory()
+    return peak - before
 
 
 DAMAGED: list[tuple[str, str, str]] = [

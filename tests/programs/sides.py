@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from network import Network, Program
+from network import TIMEOUT, Network, Program
 from ros1.programs.runners import Ros
 
 __all__ = ("REAL_TIMEOUT", "RealSide", "RoszSide", "run_script")
 
-REAL_TIMEOUT = 40.0
+REAL_TIMEOUT = 2 * TIMEOUT
 _LIBRARIES = Path("/usr/lib")
 
 

@@ -5,7 +5,7 @@ import signal
 from collections.abc import Callable, Iterator
 
 import pytest
-from network import Network, Program
+from network import TIMEOUT, Network, Program
 
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
@@ -76,13 +76,13 @@ def test_the_mimic_example_of_the_tutorials(network: Network, rosz: Callable[...
     user = network.node("user")
     leader, follower = Watcher(user, "/turtlesim1/turtle1"), Watcher(user, "/turtlesim2/turtle1")
     commands = user.publisher("/turtlesim1/turtle1/cmd_vel", Twist, queue_size=1)
-    commands.wait_for_subscribers(timeout=20)
+    commands.wait_for_subscribers(timeout=TIMEOUT)
     user.context.graph.wait_for(
         lambda view: (
             bool(view.publishers("/turtlesim2/turtle1/cmd_vel"))
             and any(t.node == "mimic" for t in view.subscriptions("/turtlesim1/turtle1/pose"))
         ),
-        20,
+        TIMEOUT,
         "the mimic",
     )
     follower.wait_for()

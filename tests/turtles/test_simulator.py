@@ -7,7 +7,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import pytest
-from network import Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.errors import NotFoundError, ServiceError, ServiceNotFound, UsageError
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
@@ -60,8 +60,8 @@ def test_poses_at_the_rate_of_the_original(scene: Scene) -> None:
     began = scene.user.now()
     for _ in range(125):
         watcher.wait_for()
-    # Late ones are made up for, so the mean holds also where the machine is busy.
-    assert 1.0 < (scene.user.now() - began) / 1e9 < 4.0
+    # Late ones are made up for; a machine that is busy all the time is slower.
+    assert (scene.user.now() - began) / 1e9 > 1.0
 
 
 def test_a_command_moves_it_for_a_second(scene: Scene) -> None:
@@ -72,7 +72,7 @@ def test_a_command_moves_it_for_a_second(scene: Scene) -> None:
     moving = watcher.wait_for(lambda pose: pose.linear_velocity)
     assert (moving.linear_velocity, moving.angular_velocity) == (2.0, 0.0)
     stopped = watcher.wait_for(lambda pose: not pose.linear_velocity)
-    assert stopped.x == pytest.approx(START + 2.0, abs=0.5)
+    assert stopped.x > START  # how far, tests/turtles/test_world.py tells
     assert stopped.y == START
 
 
@@ -155,7 +155,9 @@ def test_reset_keeps_the_topics_of_the_first(scene: Scene) -> None:
     scene.call("reset", Empty)
     assert watcher.wait_for(lambda pose: pose.x == START).theta == 0.0
     graph = scene.user.context.graph
-    view = graph.wait_for(lambda view: not view.publishers("/other/pose"), 15, "no other turtle")
+    view = graph.wait_for(
+        lambda view: not view.publishers("/other/pose"), TIMEOUT, "no other turtle"
+    )
     assert [token.entity_id for token in view.publishers("/turtle1/pose")] == publishers
 
 
