@@ -20,9 +20,9 @@ SCRIPTS = {
         from std_msgs.msg import String
         rospy.init_node("talker")
         own = rospy.myargv()[1:]
+        rospy.on_shutdown(lambda: print("bye", rospy.get_name(), flush=True))
         print("I am", rospy.get_name(), os.getpid(), own, rospy.get_param("~word", "-"), flush=True)
         words = rospy.Publisher("words", String, queue_size=100, latch=True)
-        rospy.on_shutdown(lambda: print("bye", rospy.get_name(), flush=True))
         words.publish("hello from " + rospy.get_name())
         rospy.spin()
     """,
@@ -33,9 +33,9 @@ SCRIPTS = {
             origin = message._connection_header["callerid"]
             print(rospy.get_name(), "heard", message.data, "of", origin, flush=True)
         rospy.init_node("listener")
+        rospy.on_shutdown(lambda: print("bye", rospy.get_name(), flush=True))
         print("I am", rospy.get_name(), os.getpid(), flush=True)
         rospy.Subscriber("words", String, heard)
-        rospy.on_shutdown(lambda: print("bye", rospy.get_name(), flush=True))
         rospy.spin()
     """,
     "crasher.py": """

@@ -51,7 +51,7 @@ def box(site: Site) -> Program:
 
 
 def _pid(program: Program, node: str, times: int = 1) -> int:
-    line = program.wait_for(re.compile(rf"I am {node} "), 30, times=times)
+    line = program.wait_for(re.compile(rf"I am {node} "), times=times)
     return int(line.split()[3])
 
 
@@ -82,13 +82,14 @@ def test_a_crash_names_the_node_and_it_starts_again(box: Program) -> None:
     box.wait_for(re.compile(r"crasher.py\", line 5, in <module>"))
     box.wait_for(
         re.compile("ERROR: node '/c1' .*crasher.py.* of container '/box' has died, exit code 1:"
-                   " ValueError: broken on purpose"), 30, times=2,
+                   " ValueError: broken on purpose"), times=2,
     )  # fmt: skip
     box.wait_for("[/c1] restarting in container '/box'")
 
 
 def test_the_status_shows_the_members(site: Site, box: Program) -> None:
-    _pid(box, "/n1")
+    for name in ("/deep/t1", "/l1", "/n1", "/t2", "/load1"):
+        _pid(box, name)
     status = site.rosz("launch", "--status")
     assert status.exit_code() == 0
     assert re.search(r"/box +running .*\n +/deep/t1 +in /box", status.output)
@@ -114,6 +115,8 @@ def test_a_container_that_is_killed_starts_again(box: Program) -> None:
     box.wait_for(re.compile(r"process of nodes /deep/t1, /l1, .* has died .*exit code -9"))
     box.wait_for(re.compile(r"\[box-1\] restarting process"))
     _pid(box, "/t2", times=2)
+    _pid(box, "/deep/t1", times=2)
+    _pid(box, "/load1")
     box.send(signal.SIGINT)
     assert box.exit_code() == 1  # a node could not be started
     assert "bye /deep/t1" in box.output
