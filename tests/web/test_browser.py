@@ -175,6 +175,8 @@ def test_a_field_is_dragged_into_the_plot_and_the_picture_saved(
     world.open("/plot")
     world.should_see("/wave", "No field is plotted")
     leaf = ".q-tree span[draggable]"
+    there = "return document.querySelector(arguments[0]) !== null"
+    world.click_until("/wave", lambda: bool(world.ask(there, leaf)))
     drag = (leaf, ".nicegui-content .grow.min-w-0")
     eventually(lambda: world.ask(_DRAG, *drag), "a field to drag", LONG)
     world.should_see("/wave/data")

@@ -9,7 +9,7 @@ rospy.init_node("slow_server")
 
 def handle(request):
     print("ready")
-    rospy.sleep(60)
+    rospy.sleep(4)
     return True, "slept"
 
 
