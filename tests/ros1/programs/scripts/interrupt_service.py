@@ -9,7 +9,7 @@ rospy.init_node("slow_server")
 
 def handle(request):
     print("ready")
-    rospy.sleep(4)
+    rospy.sleep(1)
     return True, "slept"
 
 
