@@ -176,8 +176,8 @@ CLIENT = """
     import rosz.ros1, rospy, tf2_ros
     rospy.init_node("user")
     client = tf2_ros.BufferClient("/tf_buffer")
-    assert client.wait_for_server(rospy.Duration(15))
-    found = client.lookup_transform("map", "camera", rospy.Time(0), rospy.Duration(10))
+    assert client.wait_for_server(rospy.Duration(60))
+    found = client.lookup_transform("map", "camera", rospy.Time(0), rospy.Duration(60))
     print(found.transform.translation.x)
     rospy.signal_shutdown("done")
 """

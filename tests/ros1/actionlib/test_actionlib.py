@@ -32,7 +32,7 @@ SERVER = """
                 return
             total += number
             server.publish_feedback(CountFeedback(number))
-            rospy.sleep(0.01)
+            rospy.sleep(0.2)  # clients take the feedback before the result
         server.set_succeeded(CountResult(total), "counted")
 
     rospy.init_node("server")
@@ -49,7 +49,7 @@ CLIENT = """
     from counting.msg import CountAction, CountGoal
     rospy.init_node("client")
     client = actionlib.SimpleActionClient("//count", CountAction)  # rospy tidies names
-    assert client.wait_for_server(rospy.Duration(15))
+    assert client.wait_for_server(rospy.Duration(60))
 """
 
 
@@ -75,14 +75,14 @@ def test_goals(network: Network, path: str) -> None:
         active_cb=lambda: heard.append("active"),
         feedback_cb=lambda feedback: heard.append(feedback.now),
     )
-    print(client.wait_for_result(rospy.Duration(15)), client.get_state(), client.get_result().sum,
+    print(client.wait_for_result(rospy.Duration(60)), client.get_state(), client.get_result().sum,
           client.get_goal_status_text(), client.simple_state)
     print(sorted(heard, key=str))
-    print(client.send_goal_and_wait(CountGoal(-1), rospy.Duration(15)),
+    print(client.send_goal_and_wait(CountGoal(-1), rospy.Duration(60)),
           client.get_goal_status_text())
-    print(client.send_goal_and_wait(CountGoal(0), rospy.Duration(15)),
+    print(client.send_goal_and_wait(CountGoal(0), rospy.Duration(60)),
           client.get_goal_status_text())
-    print(client.send_goal_and_wait(CountGoal(100000), rospy.Duration(0.2), rospy.Duration(15)),
+    print(client.send_goal_and_wait(CountGoal(100000), rospy.Duration(0.2), rospy.Duration(60)),
           client.get_goal_status_text())
 """,
         ROSZ_PACKAGE_PATH=path,
@@ -139,12 +139,12 @@ def test_goal_callbacks(network: Network, path: str) -> None:
         server.register_preempt_callback(give_way)
         server.start()
         client = actionlib.SimpleActionClient("//count", CountAction)  # rospy tidies names
-        print(client.get_state(), client.wait_for_server(rospy.Duration(15)))
+        print(client.get_state(), client.wait_for_server(rospy.Duration(60)))
         active = threading.Event()
         client.send_goal(CountGoal(7), active_cb=active.set)
         active.wait(60)
         client.cancel_all_goals()
-        print(client.wait_for_result(rospy.Duration(15)), client.get_state(), server.is_active())
+        print(client.wait_for_result(rospy.Duration(60)), client.get_state(), server.is_active())
         lost = actionlib.SimpleActionClient("nothing", CountAction)
         print(lost.wait_for_server(rospy.Duration(0.05)))
         """,

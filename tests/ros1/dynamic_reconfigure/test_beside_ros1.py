@@ -207,7 +207,7 @@ def test_dynparam(ros: Side, rosz: Side, tmp_path: Path) -> None:
         ["dynparam", "list"],
         ["dynparam", "set", NAME, "int_param", "-3"],
         ["dynparam", "set", NAME, "str_param", "007"],
-        ["dynparam", "set", "--timeout=5", NAME, "{int_param: 4, size: Large}"],
+        ["dynparam", "set", "--timeout=60", NAME, "{int_param: 4, size: Large}"],
         ["dynparam", "load", NAME, str(saved)],
         ["dynparam", "set_from_parameters", NAME, "_double_param:=0.5", "_str_param:=from here"],
         ["dynparam", "get", NAME],

@@ -180,8 +180,8 @@ def test_a_client(network: Network, source: Path) -> None:
     script = """
         rospy.init_node("asking")
         told = []
-        client = Client("other", timeout=15)
-        print(client.get_configuration(timeout=15)["int_param"], client.config.int_param)
+        client = Client("other", timeout=60)
+        print(client.get_configuration(timeout=60)["int_param"], client.config.int_param)
         client.config_callback = told.append
         client.description_callback = lambda found: told.append([one["name"] for one in found])
         print(len(told), told[1], client.get_config_callback() == told.append)
@@ -261,7 +261,7 @@ def test_a_stopped_server_ends_no_client(network: Network, source: Path) -> None
         import dynamic_reconfigure.client
         dynamic_reconfigure.client._REPLY_TIMEOUT = 1.0
         rospy.init_node("asking")
-        client = Client("tuned", timeout=15)
+        client = Client("tuned", timeout=60)
         print(client.get_configuration().int_param)
         sys.stdin.readline()
         print(client.get_configuration(timeout=0.2).int_param)

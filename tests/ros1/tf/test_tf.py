@@ -32,7 +32,7 @@ def test_tf_and_tf2(network: Network) -> None:
         from geometry_msgs.msg import PointStamped, PoseStamped
         rospy.init_node("viewer")
         listener = tf.TransformListener()
-        listener.waitForTransform("/map", "/laser", rospy.Time(0), rospy.Duration(15))
+        listener.waitForTransform("/map", "/laser", rospy.Time(0), rospy.Duration(60))
         position, rotation = listener.lookupTransform("/map", "/laser", rospy.Time(0))
         print([round(x, 3) for x in position], [round(x, 3) for x in rotation])
         point = PointStamped()
@@ -53,11 +53,11 @@ def test_tf_and_tf2(network: Network) -> None:
             print(error)
         buffer = tf2_ros.Buffer()
         tf2_ros.TransformListener(buffer)
-        found = buffer.lookup_transform("map", "laser", rospy.Time(0), rospy.Duration(15))
+        found = buffer.lookup_transform("map", "laser", rospy.Time(0), rospy.Duration(60))
         print(found.header.frame_id, found.child_frame_id, found.transform.translation.z)
         print(round(buffer.transform(point, "map").point.y, 3))
         later = rospy.Time.now() + rospy.Duration(0.2)
-        print(buffer.can_transform("map", "base", later, rospy.Duration(15)))
+        print(buffer.can_transform("map", "base", later, rospy.Duration(60)))
         try:
             buffer.transform(3, "map")
         except tf2_ros.TypeException as error:
@@ -152,7 +152,7 @@ def test_buffers_of_other_nodes(network: Network) -> None:
         rospy.wait_for_service("/server/tf2_frames", 60)
         print(rospy.ServiceProxy("/server/tf2_frames", FrameGraph)().frame_yaml.splitlines()[:2])
         buffer = tf2_ros.BufferClient("lookups")
-        print(buffer.wait_for_server(rospy.Duration(15)))
+        print(buffer.wait_for_server(rospy.Duration(60)))
         none = rospy.Duration(0)
         print(buffer.lookup_transform("base", "laser", rospy.Time(0)).transform.translation.x)
         zero = rospy.Time(0)

@@ -37,9 +37,9 @@ if __name__ == "__main__":
         dynamic_reconfigure.client.Client("nobody", timeout=0.1)
     except rospy.ROSException as error:
         print(str(error).split(" service")[0])
-    client = dynamic_reconfigure.client.Client("dynamic_tutorials", timeout=30)
+    client = dynamic_reconfigure.client.Client("dynamic_tutorials", timeout=60)
     print(show(client.get_configuration()))
-    for one in client.get_parameter_descriptions(timeout=10):
+    for one in client.get_parameter_descriptions(timeout=60):
         print(sorted((k, v) for k, v in one.items() if k != "edit_method"))
     print(client.get_group_descriptions()["name"], sorted(client.get_group_descriptions()))
     for changes in CHANGES:
@@ -57,5 +57,5 @@ if __name__ == "__main__":
     other.get_configuration()
     while not told:
         rospy.sleep(0.01)
-    print(show(told[0]) == show(other.get_configuration(timeout=5)))
+    print(show(told[0]) == show(other.get_configuration(timeout=60)))
     print(other.config_callback == told.append, other.get_description_callback())

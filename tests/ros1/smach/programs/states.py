@@ -187,7 +187,7 @@ while "/viewed" not in client.get_servers():
     rospy.sleep(0.05)
 given = smach.UserData()
 given.key = {"a": [1, 2.5]}
-show("set", client.set_initial_state("viewed", "/TOP", ["IN"], given, rospy.Duration(20)))
+show("set", client.set_initial_state("viewed", "/TOP", ["IN"], given, rospy.Duration(60)))
 show("begins", top.get_initial_states(), top.userdata.key)
 set_preempt_handler(top)
 thread = threading.Thread(target=top.execute)
