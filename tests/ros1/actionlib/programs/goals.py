@@ -12,7 +12,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from std_msgs.msg import String
 
 rospy.init_node("goals")
-WAIT = 30
+WAIT = 60
 
 
 def show(name, *values):

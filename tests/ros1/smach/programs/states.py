@@ -22,7 +22,7 @@ from std_msgs.msg import Int32
 
 rospy.init_node("states")
 smach.set_loggers(*[lambda text: None] * 4)
-WAIT = rospy.Duration(30)
+WAIT = rospy.Duration(60)
 
 
 def show(name, *values):
