@@ -122,7 +122,7 @@ def test_arguments_of_calls(printed: Printed) -> None:
     assert printed("""
     rospy.Service("s", AddTwoInts, lambda r: r.a + r.b)
     add = rospy.ServiceProxy("s", AddTwoInts, persistent=True, headers={"x": "y"})
-    add.wait_for_service(5)
+    add.wait_for_service(60)
     print(add(1, 2).sum, add(a=3, b=4).sum, add(AddTwoIntsRequest(5, 6)).sum, add().sum)
     print(add.call(1, 1).sum, add.call(AddTwoIntsRequest(a=2)).sum, add(b=9).sum)
     show("one", lambda: add(1))
