@@ -20,7 +20,6 @@ def _of_ros2(what: str) -> str:
 
 
 _WINDOWS = "'rosz web' shows graph, plots, log, parameters and more in a browser"
-_PICTURES = "'rosz web' shows images at /images"
 _GAZEBO = "'rosz launch turtlebot3_sim turtlebot3_sim.launch' simulates a TurtleBot3; " + _of_ros2(
     "ros_gz_bridge"
 )
@@ -53,7 +52,6 @@ _PACKAGES = {
     "gazebo_ros": _GAZEBO,
     "gmapping": _of_ros2("slam_toolbox"),
     "image_transport": "publish sensor_msgs/Image, or sensor_msgs/CompressedImage, itself",
-    "image_view": _PICTURES,
     "joint_state_publisher_gui": "publish sensor_msgs/JointState, or use 'rosz topic pub'",
     "move_base": _of_ros2("nav2_bringup"),
     "nodelet": "nodelets of C++ need ROS 1; nodes of Python share a process, too: 'rosz"

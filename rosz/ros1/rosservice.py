@@ -12,7 +12,7 @@ from rosz.names import short_type
 from rosz.ros1.genpy import get_printable_message_args, get_service_class
 from rosz.ros1.rosgraph.masterapi import Master
 from rosz.ros1.rosgraph.names import make_global_ns, script_resolve_name
-from rosz.ros1.state import survey, unnamed_node
+from rosz.ros1.state import find, survey, unnamed_node
 from rosz.ros1.tool import Tool
 
 __all__ = (
@@ -64,7 +64,7 @@ def get_service_list(
 def _server(service_name: str) -> Any:
     """Return the server of a service, or None if there is none."""
     try:
-        return find_server(survey().view, service_name)
+        return find(lambda view: find_server(view, service_name))
     except NotFoundError:
         return None
 

@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosz import remap
 from rosz.errors import ClosedError
@@ -23,6 +23,7 @@ from rosz.ros1.exceptions import ROSInitException
 from rosz.wire import Token
 
 if TYPE_CHECKING:
+    from rosz.graph import View
     from rosz.introspect.survey import Survey
     from rosz.message import Message
 
@@ -33,6 +34,7 @@ __all__ = (
     "arguments",
     "context",
     "cooperate",
+    "find",
     "has_node",
     "is_shutdown",
     "node",
@@ -49,6 +51,8 @@ __all__ = (
     "unnamed_node",
     "when_ready",
 )
+
+T = TypeVar("T")
 
 NO_NODE = "client code must call rospy.init_node() first"
 """Text of the error of functions that need the node."""
@@ -240,6 +244,23 @@ def survey() -> Survey:
     except ClosedError:  # threads of a program look at the graph while it ends
         view = opened.graph.known()
     return Survey(opened.domain, view, {(p.zid, p.node_id): p for p in view.processes()})
+
+
+def find(look: Callable[[View], T]) -> T:
+    """Return what a function finds in the graph; after the shutdown, in what was known last.
+
+    Args:
+        look: Function that raises `NotFoundError` if it does not find what it looks for.
+
+    Raises:
+        NotFoundError: It is not there.
+        TransportError: The session cannot be opened.
+    """
+    opened = ready_context()
+    try:
+        return opened.graph.find(look)
+    except ClosedError:
+        return look(opened.graph.known())
 
 
 def node_uri(zid: str, node_id: int, host: str) -> str:

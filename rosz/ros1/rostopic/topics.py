@@ -16,7 +16,7 @@ from rosz.names import ros1_type
 from rosz.ros1.genpy import get_message_class
 from rosz.ros1.importer import type_store
 from rosz.ros1.rosgraph.masterapi import Master
-from rosz.ros1.state import ready_context, survey
+from rosz.ros1.state import find, ready_context, survey
 from rosz.wire import Kind
 
 __all__ = (
@@ -107,7 +107,7 @@ def get_topic_type(topic: str, blocking: bool = False) -> Found:
 
 def _find(topic: str) -> Found:
     try:
-        target = find_target(topic, survey().view.topics(), type_store().message)
+        target = find(lambda view: find_target(topic, view.topics(), type_store().message))
     except TypeNotFound:
         raise
     except NotFoundError:
