@@ -18,7 +18,7 @@ import zenoh
 
 from rosz.worker import Worker
 
-__all__ = ("Channel", "declare", "declare_rare", "open_channel")
+__all__ = ("Channel", "declare", "declare_rare", "open_channel", "waits_in_zenoh")
 
 T = TypeVar("T")
 
@@ -98,6 +98,15 @@ def declare_rare(declaring: Callable[[Any], T]) -> tuple[T, Channel]:
     if error is not None:
         raise error
     return entity, channel  # type: ignore[return-value]  # there is one without an error
+
+
+def waits_in_zenoh(channel: Channel) -> bool:
+    """Return whether a thread that receives from a channel waits inside Zenoh.
+
+    One that waits elsewhere has to go on until the channel is closed, also while the program ends:
+    only then has the thread of Zenoh that fills it left Python.
+    """
+    return not isinstance(channel, _RareChannel)
 
 
 class _RareChannel:

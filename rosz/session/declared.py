@@ -13,7 +13,7 @@ import zenoh
 
 from rosz.errors import ClosedError, TransportError
 from rosz.session.at_exit import ENDING, leak_at_exit
-from rosz.session.channels import Channel
+from rosz.session.channels import Channel, waits_in_zenoh
 from rosz.session.samples import Sample
 from rosz.worker import Worker
 
@@ -149,7 +149,7 @@ class CallbackThread(Declared):
         super().__init__(what, entity)
         # The thread must not refer to this object, else it would not be undeclared. The items
         # must not leave this package, not even as arguments: see `rosz.session.at_exit`.
-        recv, try_recv = channel.recv, channel.try_recv
+        recv, try_recv, in_zenoh = channel.recv, channel.try_recv, waits_in_zenoh(channel)
         item: Any = None
 
         def receive() -> bool | None:
@@ -157,7 +157,7 @@ class CallbackThread(Declared):
             first, begin = begin, None
             if first is not None:
                 first()
-            if ENDING.is_set():
+            if ENDING.is_set() and in_zenoh:
                 return None
             try:
                 if idle is not None:

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from network import Network
+import threading
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from network import TIMEOUT, Network
+
+from rosz.session import declared
+from rosz.session.channels import declare_rare
+from rosz.session.declared import CallbackThread
 
 
 def test_a_thread_that_leaves_late_is_waited_for(network: Network) -> None:
@@ -23,3 +32,34 @@ def test_a_thread_that_leaves_late_is_waited_for(network: Network) -> None:
     )
     assert program.exit_code() == 0
     assert program.lines == ["has left"]
+
+
+class Entity:
+    """What Zenoh returns for a declaration."""
+
+    def undeclare(self) -> None:
+        """Do nothing."""
+
+
+def test_a_thread_of_zenoh_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has left Python only when it has closed its channel, also while the program ends."""
+    ending = threading.Event()
+    monkeypatch.setattr(declared, "ENDING", ending)
+    handlers: list[Any] = []
+    received: SimpleQueue[int] = SimpleQueue()
+
+    def declare(handler: Any) -> Entity:
+        handlers.append(handler)
+        return Entity()
+
+    def callback(item: int) -> None:
+        ending.set()
+        received.put(item)
+
+    thread = CallbackThread("test", declare_rare(declare), callback)
+    (handler,) = handlers
+    for item in (1, 2):
+        handler.callback(item)
+    assert [received.get(timeout=TIMEOUT) for _ in range(2)] == [1, 2]
+    handler.drop()
+    thread.close()
