@@ -69,7 +69,7 @@ def test_a_command_that_the_machine_has_goes_first(network: Network) -> None:
     assert (done.stdout, done.stderr) == ("the real one\n", "")
 
 
-@pytest.mark.parametrize("name", ["image_transport", "rqt_anything", "gazebo_ros"])
+@pytest.mark.parametrize("name", ["usb_cam", "rqt_anything", "gazebo_ros"])
 def test_a_program_of_a_package(network: Network, name: str) -> None:
     done = evaluate(network, f"rosrun {name} {name}")
     assert done.returncode == 1

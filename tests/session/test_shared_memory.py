@@ -57,7 +57,7 @@ def exchanged(network: Network, threshold: str, *wrapper: str) -> str:
     try:
         line = listener.wait_for("shared: ")
         talker.wait_for("sent")
-        assert listener.exit_code() == 0
+        assert listener.exit_code() == 0, listener.output
     finally:
         talker.close()
     return line

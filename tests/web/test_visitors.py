@@ -67,6 +67,21 @@ def refusal(address: str) -> tuple[int, str]:
         return error.code, error.read().decode()
 
 
+def visit(pages: Pages, path: str = "/", *, awake: bool = True) -> Visitor:
+    """Open a page when there is room: those of the tests before are kept for a while."""
+    opened: list[Visitor] = []
+
+    def opens() -> bool:
+        try:
+            opened.append(Visitor(pages.address, path, awake=awake))
+        except HTTPError:
+            return False
+        return True
+
+    eventually(opens, "room for a page", LONG)
+    return opened[0]
+
+
 def test_the_start_leaves_out_what_serves_no_page(pages: Pages) -> None:
     assert pages.server.wait_for("aiohttp is loaded", LONG).endswith("False")
 
@@ -81,29 +96,21 @@ def test_too_many(pages: Pages) -> None:
     for one in visitors:
         one.wait_for("newcomer")
         one.close()
-
-    def opens() -> bool:
-        try:
-            Visitor(pages.address).close()
-        except HTTPError:
-            return False
-        return True
-
-    eventually(opens, "room for a page", LONG)
+    visit(pages).close()
 
 
 def test_one_that_is_busy(pages: Pages) -> None:
     """A browser that draws for seconds before it answers a ping keeps its page."""
-    one = Visitor(pages.address)
+    one = visit(pages)
     one.wait_for('"pingTimeout":20000')
     one.close()
 
 
 def test_one_that_sleeps(pages: Pages) -> None:
     """A page whose browser reads nothing is closed, with what it observes; another one goes on."""
-    asleep = Visitor(pages.address, "/console", awake=False)
+    asleep = visit(pages, "/console", awake=False)
     eventually(pages.observed, "the page to observe the log", LONG)
-    awake = Visitor(pages.address, "/services")
+    awake = visit(pages, "/services")
     eventually(lambda: not pages.observed(), "the end of the page that sleeps", LONG)
     pages.node.service("late", Empty, lambda _: Empty.Response())
     awake.wait_for("/late")
@@ -113,7 +120,7 @@ def test_one_that_sleeps(pages: Pages) -> None:
 
 def test_foreign_pages_and_garbage(pages: Pages) -> None:
     """A websocket of another origin is refused; frames that are no messages end theirs alone."""
-    one = Visitor(pages.address, "/graph")
+    one = visit(pages, "/graph")
     place = pages.address.replace("http", "ws", 1) + SOCKET
     with pytest.raises(InvalidStatus, match="403"), connect(place, origin=Origin("http://evil")):
         pass
