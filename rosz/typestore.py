@@ -80,7 +80,7 @@ class TypeStore:
                 ``example_interfaces/action/Fibonacci_FeedbackMessage``.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The type or one in it is not well-formed.
         """
         cls: type[Message] = self._class(name, "msg")
@@ -94,7 +94,7 @@ class TypeStore:
                 ``example_interfaces/action/Fibonacci_SendGoal``.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The type or one in it is not well-formed.
         """
         cls: type[Service] = self._class(name, "srv")
@@ -107,7 +107,7 @@ class TypeStore:
             name: ``example_interfaces/Fibonacci`` or ``example_interfaces/action/Fibonacci``.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The type or one in it is not well-formed.
         """
         cls: type[Action] = self._class(name, "action")
@@ -176,7 +176,7 @@ class TypeStore:
             package: Package that the types belong to; any when not given.
 
         Raises:
-            PackageNotFound: There is no such package.
+            PackageNotFound: The package does not exist.
         """
         if package is not None:
             if package not in self.packages():
@@ -204,7 +204,7 @@ class TypeStore:
                 action or of what ROS 2 makes of it.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The file cannot be read.
         """
         package, _, base = name.split("/")
@@ -242,7 +242,7 @@ class TypeStore:
             on Python's path.
 
         Raises:
-            PackageNotFound: There is no such package.
+            PackageNotFound: The package does not exist.
             TypeNotFound: A package has no types of its own.
             DefinitionError: A definition is not well-formed, or a type in it does not exist.
         """

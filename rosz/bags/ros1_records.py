@@ -149,7 +149,7 @@ def number(fields: Fields, name: str, offset: int) -> int:
     """Return a field that is a number.
 
     Raises:
-        RecordError: There is no such field.
+        RecordError: The field does not exist.
     """
     if name not in fields:
         raise RecordError(f"a record without a field '{name}'", offset)
@@ -160,7 +160,7 @@ def stamp(fields: Fields, name: str, offset: int) -> int:
     """Return a field that is a time, in nanoseconds.
 
     Raises:
-        RecordError: There is no such field, or it is not a time.
+        RecordError: The field does not exist, or it is not a time.
     """
     value = fields.get(name, b"")
     if len(value) != _STAMP.size:
@@ -173,7 +173,7 @@ def text(fields: Fields, name: str, default: str | None = None) -> str:
     """Return a field that is text.
 
     Raises:
-        KeyError: There is no such field, and no default.
+        KeyError: The field does not exist, and has no default.
     """
     if default is not None and name not in fields:
         return default

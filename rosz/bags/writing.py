@@ -1,4 +1,4 @@
-"""Telling a bag that is being written from one whose writer was killed.
+"""Locks that distinguish a bag that is being written from one whose writer was killed.
 
 A writer locks its file, and the system unlocks it when the process ends in whatever way.
 """

@@ -120,7 +120,7 @@ class Catalog:
         """Return the spec of a message, checked to refer to existing types only.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
         """
         spec = self._message(name)
@@ -131,7 +131,7 @@ class Catalog:
         """Return the spec of a service, checked to refer to existing types only.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
         """
         if name not in self._services:
@@ -146,7 +146,7 @@ class Catalog:
         """Return the spec of an action, checked to refer to existing types only.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
         """
         if name not in self._actions:
@@ -164,7 +164,7 @@ class Catalog:
             name: Full name of the message, service or action.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             DefinitionError: The type or one in it is not well-formed, is missing, or holds itself.
         """
         _, kind, base = name.split("/")
@@ -292,7 +292,7 @@ class Folders:
         """Return the definition of a full name.
 
         Raises:
-            TypeNotFound: There is no such package, or no such type in it.
+            TypeNotFound: The package does not exist, or has no such type.
             DefinitionError: The file cannot be read.
         """
         package, kind, base = name.split("/")

@@ -63,7 +63,7 @@ class Definitions:
             name: ``pkg/Name``, ``pkg/msg/Name``, or ``Name`` alone; a suffix ``.msg`` is ignored.
 
         Raises:
-            TypeNotFound: There is no such type.
+            TypeNotFound: The type does not exist.
             UsageError: The name is not valid for a type.
         """
         name = name.removesuffix(f".{self._kind}")

@@ -177,7 +177,7 @@ def find_target(name: str, topics: Mapping[str, Sequence[str]], load: Loader) ->
         load: Function that returns the class of a type.
 
     Raises:
-        NotFoundError: There is no such topic, or it has no such field; the text says which.
+        NotFoundError: The topic or the field does not exist; the text says which.
         UsageError: The path is malformed.
     """
     if name in topics:

@@ -89,7 +89,7 @@ def find_nodes(survey: Survey, name: str) -> list[Token]:
     """Return one token for each node of a full name.
 
     Raises:
-        NotFoundError: There is no such node.
+        NotFoundError: The node does not exist.
     """
     found = survey.nodes_named(name)
     if not found:

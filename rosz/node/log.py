@@ -365,7 +365,7 @@ class NodeLog(NodeLogger):
 
         Raises:
             NotFoundError: The node has no such logger.
-            UsageError: There is no such level.
+            UsageError: The level does not exist.
         """
         loggers = self._loggers()
         is_ros_name = f"{name}.".startswith(f"{self._ros_name}.")

@@ -119,7 +119,7 @@ class Description:
         """Return the setting with a name.
 
         Raises:
-            ParamError: There is no such setting.
+            ParamError: The setting does not exist.
         """
         found = self.settings.get(name)
         if found is None:
@@ -134,7 +134,7 @@ class Description:
             changes: New values by name; ``groups`` is left out.
 
         Raises:
-            ParamError: There is no such setting, or a value cannot be converted.
+            ParamError: The setting does not exist, or a value cannot be converted.
         """
         return {
             name: self.setting(name).convert(value)

@@ -118,7 +118,7 @@ class Server:
             The configuration after the change; the callback may have chosen other values.
 
         Raises:
-            ParamError: There is no such setting, or a value cannot be converted.
+            ParamError: The setting does not exist, or a value cannot be converted.
             ClosedError: The node is closed.
         """
         values = self.description.convert(changes)

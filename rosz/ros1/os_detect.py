@@ -16,7 +16,7 @@ class OsNotDetected(Exception):
 
 
 class InvalidDistro(Exception):
-    """There is no such distribution of ROS."""
+    """The distribution of ROS does not exist."""
 
 
 class OsDetect:

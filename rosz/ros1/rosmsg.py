@@ -52,7 +52,7 @@ def get_msg_text(type_: str, raw: bool = False, rospack: RosPack | None = None) 
         rospack: Ignored; all types that can be imported are found.
 
     Raises:
-        ROSMsgException: There is no such type, or its definition is invalid.
+        ROSMsgException: The type does not exist, or its definition is invalid.
     """
     return _read(MODE_MSG, type_, Definitions.text if raw else Definitions.show)
 
@@ -80,7 +80,7 @@ def rosmsg_md5(mode: str, type_: str) -> str:
     """Return the MD5 hash of a definition.
 
     Raises:
-        ROSMsgException: There is no such type, or its definition is invalid.
+        ROSMsgException: The type does not exist, or its definition is invalid.
     """
     return _read(mode, type_, Definitions.md5)
 
@@ -99,7 +99,7 @@ def list_types(package: str, mode: str = MODE_MSG, rospack: RosPack | None = Non
     """Return the names of the messages or services of a package.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
         ValueError: The mode is neither `MODE_MSG` nor `MODE_SRV`.
     """
     kind: Any = "msg" if mode == MODE_MSG else "srv"

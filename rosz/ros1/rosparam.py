@@ -212,7 +212,7 @@ def load_file(
         verbose: Whether to write the progress to stdout.
 
     Raises:
-        RosParamException: There is no such file.
+        RosParamException: The file does not exist.
         YAMLError: The text is not YAML.
     """
     if filename == "-":

@@ -337,7 +337,7 @@ class ManifestManager:
         """Return the folder of a package.
 
         Raises:
-            ResourceNotFound: There is no such package.
+            ResourceNotFound: The package does not exist.
             InvalidManifest: The package.xml in a folder of that name cannot be read.
         """
         try:
@@ -351,7 +351,7 @@ class ManifestManager:
         """Return the manifest of a package.
 
         Raises:
-            ResourceNotFound: There is no such package.
+            ResourceNotFound: The package does not exist.
             InvalidManifest: Its package.xml cannot be read.
         """
         if name not in self._manifests:
@@ -367,7 +367,7 @@ class ManifestManager:
             implicit: Whether to include the dependencies of the dependencies.
 
         Raises:
-            ResourceNotFound: There is no such package.
+            ResourceNotFound: The package does not exist.
         """
         found = [depend.name for depend in self.get_manifest(name).depends]
         if not implicit:
@@ -386,7 +386,7 @@ class ManifestManager:
         """Return the packages on the path that depend on a package; see `get_depends`.
 
         Raises:
-            ResourceNotFound: There is no such package.
+            ResourceNotFound: The package does not exist.
         """
         self.get_path(name)
         return [
@@ -429,7 +429,7 @@ class RosPack(ManifestManager):
         """Return None: catkin packages do not belong to stacks.
 
         Raises:
-            ResourceNotFound: There is no such package.
+            ResourceNotFound: The package does not exist.
         """
         self.get_path(name)
 
@@ -464,7 +464,7 @@ class RosStack:
         """Return the folder of a stack.
 
         Raises:
-            ResourceNotFound: There is no such stack.
+            ResourceNotFound: The stack does not exist.
         """
         try:
             return self._folders[name]
@@ -475,7 +475,7 @@ class RosStack:
         """Return the names of the packages in a stack.
 
         Raises:
-            ResourceNotFound: There is no such stack.
+            ResourceNotFound: The stack does not exist.
         """
         return RosPack([self.get_path(name)]).list()
 

@@ -46,7 +46,7 @@ def load_pkg_module(package: str, directory: str) -> ModuleType:
     """Import ``msg`` or ``srv`` of a package, and return the package.
 
     Raises:
-        ImportError: There is no such package.
+        ImportError: The package does not exist.
     """
     import_module(f"{package}.{directory}")
     return sys.modules[package]
@@ -56,7 +56,7 @@ def load_message(package: str, message: str) -> Any:
     """Return the class of a message.
 
     Raises:
-        ImportError: There is no such package.
+        ImportError: The package does not exist.
         AttributeError: The package has no such message.
     """
     return getattr(load_pkg_module(package, "msg").msg, message)
@@ -66,7 +66,7 @@ def load_service(package: str, service: str) -> tuple[Any, Any, Any]:
     """Return the classes of a service, its request and its response.
 
     Raises:
-        ImportError: There is no such package.
+        ImportError: The package does not exist.
         AttributeError: The package has no such service.
     """
     srv = load_pkg_module(package, "srv").srv

@@ -103,7 +103,7 @@ class Master:
         """Return the result of a call.
 
         Raises:
-            ServiceError: There is no such method.
+            ServiceError: The method does not exist.
         """
         if call.path.startswith(f"{NODE_PATH}/"):
             return self._node_api(call.path.removeprefix(NODE_PATH).rstrip("/"), call, stream)

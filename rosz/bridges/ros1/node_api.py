@@ -66,7 +66,7 @@ class NodeApi:
             stream: The connection that it came on.
 
         Raises:
-            ServiceError: There is no such method.
+            ServiceError: The method does not exist.
         """
         method = self._methods.get(call.method)
         if method is None:

@@ -1,4 +1,4 @@
-"""Whether ROS 1's nodes are still there: a killed one does not unregister."""
+"""Detection of ROS 1 nodes that have ended: a killed node does not unregister."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Tasks = Worker[Callable[[], object]]
 
 
 class Prober:
-    """Looks from time to time, and when asked, whether nodes listen at their URIs.
+    """Checks every three seconds, and on request, whether nodes listen at their URIs.
 
     Args:
         requests: Threads for what waits for other programs.

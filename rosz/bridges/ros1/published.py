@@ -72,11 +72,11 @@ class PublishedTopic:
 
     @property
     def is_connecting(self) -> bool:
-        """Whether the network wants its messages and the node has not answered, or refused, yet."""
+        """Whether a connection was requested that the node has neither accepted nor refused."""
         return self._connecting and not self._reported
 
     def when_connected(self, task: Callable[[], object]) -> None:
-        """Run a task on the thread for changes when the node has answered, or refused, or gone."""
+        """Run a task on the thread for changes when the node has accepted, refused or ended."""
         self._when_connected.append(task)
 
     def update(self) -> None:

@@ -207,7 +207,7 @@ class ServedActions:
         """Serve an action with what the client does.
 
         Raises:
-            RoszError: There is no such type.
+            RoszError: The type does not exist.
         """
         kind = self._node.context.types.action(operation.type)
         execute = partial(self._execute, name, operation.type, kind, spelling)

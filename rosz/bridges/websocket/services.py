@@ -114,7 +114,7 @@ class ServedServices:
         """Serve a service with the answers of the client.
 
         Raises:
-            RoszError: There is no such type.
+            RoszError: The type does not exist.
         """
         kind = self._node.context.types.service(operation.type)
 

@@ -75,7 +75,7 @@ class CvBridge:
         """Return OpenCV's number of the type of an encoding.
 
         Raises:
-            CvBridgeError: There is no such encoding.
+            CvBridgeError: The encoding does not exist.
         """
         try:
             return getCvType(encoding)
@@ -86,7 +86,7 @@ class CvBridge:
         """Return numpy's name of the type and the number of channels of an encoding.
 
         Raises:
-            CvBridgeError: There is no such encoding.
+            CvBridgeError: The encoding does not exist.
         """
         return self.cvtype2_to_dtype_with_channels(self.encoding_to_cvtype2(encoding))
 
@@ -101,7 +101,7 @@ class CvBridge:
             desired_encoding: Encoding of the array; that of the message when ``passthrough``.
 
         Raises:
-            CvBridgeError: There is no such encoding or conversion, or the message has too few data.
+            CvBridgeError: The encoding or conversion does not exist, or the data are too few.
         """
         name, channels = self.encoding_to_dtype_with_channels(img_msg.encoding)
         kind = np.dtype(name).newbyteorder(">" if img_msg.is_bigendian else "<")
@@ -155,7 +155,7 @@ class CvBridge:
                 another one is made of them as if they were ``bgr8``.
 
         Raises:
-            CvBridgeError: There is no such conversion.
+            CvBridgeError: The conversion does not exist.
         """
         data = np.frombuffer(cmprs_img_msg.data, np.uint8)
         image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None

@@ -39,7 +39,7 @@ def parse(name: str) -> Encoding:
     """Return the meaning of an encoding.
 
     Raises:
-        RuntimeError: There is no such encoding.
+        RuntimeError: The encoding does not exist.
     """
     if name == _YUV:
         return Encoding(name, name, 2, 8)
@@ -60,7 +60,7 @@ def type_of(name: str) -> int:
     """Return the number that OpenCV has for images of an encoding, such as ``cv2.CV_8UC3``.
 
     Raises:
-        RuntimeError: There is no such encoding.
+        RuntimeError: The encoding does not exist.
     """
     encoding = parse(name)
     generic = _GENERIC.fullmatch(name)
@@ -83,7 +83,7 @@ def color_code(source: Encoding, target: Encoding) -> int | None:
     """Return OpenCV's code of a conversion; None if only the depth differs.
 
     Raises:
-        RuntimeError: There is no such conversion.
+        RuntimeError: The conversion does not exist.
     """
     if not (source.color and target.color):
         if source.channels == target.channels and not (target.color and not source.color):

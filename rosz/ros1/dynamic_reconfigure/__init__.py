@@ -30,7 +30,7 @@ class DynamicReconfigureException(Exception):
 
 
 class DynamicReconfigureParameterException(DynamicReconfigureException):
-    """There is no such parameter, or it cannot have a value."""
+    """The parameter does not exist, or it cannot have a value."""
 
 
 class DynamicReconfigureCallbackException(DynamicReconfigureException):

@@ -123,7 +123,7 @@ class Client:
             The configuration after the change.
 
         Raises:
-            DynamicReconfigureParameterException: There is no such parameter, or a value cannot be
+            DynamicReconfigureParameterException: The parameter does not exist, or a value cannot be
                 converted.
             DynamicReconfigureCallbackException: The server refused, is gone, or did not reply
                 within 10 seconds.

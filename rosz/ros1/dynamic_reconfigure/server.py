@@ -75,7 +75,7 @@ class Server:
 
         Raises:
             DynamicReconfigureCallbackException: The callback returned nothing.
-            DynamicReconfigureParameterException: There is no such parameter, or a value cannot be
+            DynamicReconfigureParameterException: The parameter does not exist, or a value cannot be
                 converted.
         """
         try:

@@ -110,7 +110,7 @@ class Bag:
     Raises:
         ValueError: An argument is not valid.
         ROSBagException: The bag cannot be read.
-        OSError: There is no such file, or it cannot be created.
+        OSError: The file does not exist, or it cannot be created.
     """
 
     def __init__(  # noqa: PLR0917  # as in ROS 1

@@ -159,7 +159,7 @@ class Master:
         """Return the URI of a node.
 
         Raises:
-            MasterError: There is no such node.
+            MasterError: The node does not exist.
         """
         found = survey()
         members = found.nodes_named(node_name)

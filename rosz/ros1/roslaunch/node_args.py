@@ -29,7 +29,7 @@ __all__ = (
 
 
 class NodeParamsException(Exception):
-    """There is no such node, or it cannot be started."""
+    """The node does not exist, or it cannot be started."""
 
 
 def get_node_list(config: ROSLaunchConfig) -> list[str]:
@@ -48,7 +48,7 @@ def get_node_args(node_name: str, roslaunch_files: Sequence[str]) -> list[str]:
     """Return the command line of a node, with its variables in front.
 
     Raises:
-        NodeParamsException: There is no such node, or its program is not there.
+        NodeParamsException: The node does not exist, or its program is not there.
     """
     node = _find(node_name, roslaunch_files)
     changed = {

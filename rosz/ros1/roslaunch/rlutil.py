@@ -47,7 +47,7 @@ def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
         args: ``PACKAGE FILE …`` or ``PATH …``.
 
     Raises:
-        RLException: There is no such package or file.
+        RLException: The package or file does not exist.
     """
     if not args:
         return []

@@ -39,7 +39,7 @@ def manifest_file(package: str, required: bool = True) -> str | None:
         required: Whether to raise an error if it has none; otherwise return None.
 
     Raises:
-        InvalidROSPkgException: There is no such package, or it has no manifest.
+        InvalidROSPkgException: The package does not exist, or it has no manifest.
     """
     folder = get_pkg_dir(package, required)
     if folder is None:
@@ -58,7 +58,7 @@ def load_manifest(package: str) -> Manifest:
     """Return the manifest of a package.
 
     Raises:
-        InvalidROSPkgException: There is no such package, or it has no manifest.
+        InvalidROSPkgException: The package does not exist, or it has no manifest.
         ManifestException: It is not valid.
     """
     return parse_file(manifest_file(package) or "")
@@ -69,7 +69,7 @@ def parse_file(file: str) -> Manifest:
 
     Raises:
         ManifestException: The file is not a manifest.
-        ValueError: There is no such file.
+        ValueError: The file does not exist.
     """
     made = Manifest()
     manifestlib.parse_file(made, file)

@@ -265,7 +265,7 @@ def parse_file(m: _Manifest, file: str) -> _Manifest:
 
     Raises:
         ManifestException: The file is not a manifest.
-        ValueError: There is no such file.
+        ValueError: The file does not exist.
     """
     path = Path(file)
     if not path.is_file():

@@ -343,7 +343,7 @@ def load_by_type(msgtype: str, package_context: str = "") -> tuple[str, MsgSpec]
         package_context: Package of a type that has none.
 
     Raises:
-        MsgSpecException: There is no such message, or its definition is invalid.
+        MsgSpecException: The message does not exist, or its definition is invalid.
     """
     package, base = package_resource_name(msgtype)
     package = package or package_context
@@ -367,7 +367,7 @@ def list_msg_types(package: str, include_depends: bool) -> list[str]:
         include_depends: Whether to add those of the packages that it depends on, with them.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     found = list_package_resources(package, include_depends, "msg", lambda p: p.endswith(EXT))
     return [name.removesuffix(EXT) for name in found]
@@ -377,7 +377,7 @@ def msg_file(package: str, type_: str) -> str:
     """Return the path of the definition of a message; it need not exist.
 
     Raises:
-        InvalidROSPkgException: There is no such package.
+        InvalidROSPkgException: The package does not exist.
     """
     return resource_file(package, "msg", type_ + EXT)
 
@@ -386,7 +386,7 @@ def get_pkg_msg_specs(package: str) -> tuple[list[tuple[str, MsgSpec]], list[str
     """Return the messages of a package, and the names of those that cannot be read.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     specs: list[tuple[str, MsgSpec]] = []
     failures: list[str] = []
@@ -456,7 +456,7 @@ def load_package(package: str) -> None:
     """Register the messages of a package.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     _init()
     if package in _loaded_packages:
@@ -475,7 +475,7 @@ def load_package_dependencies(package: str, load_recursive: bool = False) -> Non
         load_recursive: Whether to include the dependencies of the dependencies.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     for name in RosPack().get_depends(package, implicit=load_recursive):
         load_package(name)

@@ -78,7 +78,7 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:  #
         bootstrap_version: Ignored.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     if package_name in _PROVIDED:
         return
@@ -130,7 +130,7 @@ def get_pkg_dir(
         ros_package_path: Folders to search instead of those of the process.
 
     Raises:
-        InvalidROSPkgException: There is no such package.
+        InvalidROSPkgException: The package does not exist.
     """
     paths = None if ros_package_path is None else ros_package_path.split(os.pathsep)
     try:
@@ -155,7 +155,7 @@ def get_pkg_subdir(package: str, subdir: str, required: bool = True) -> str | No
             otherwise return None.
 
     Raises:
-        InvalidROSPkgException: There is no such package, or the path is that of a file.
+        InvalidROSPkgException: The package does not exist, or the path is that of a file.
     """
     top = get_pkg_dir(package, required)
     if top is None:
@@ -178,7 +178,7 @@ def resource_file(package: str, subdir: str, resource_name: str) -> str:
     """Return the path of a file in a folder of a package; it need not exist.
 
     Raises:
-        InvalidROSPkgException: There is no such package.
+        InvalidROSPkgException: The package does not exist.
     """
     folder = get_pkg_subdir(package, subdir, required=False)
     top = folder or str(Path(get_pkg_dir(package) or "", subdir))
@@ -189,7 +189,7 @@ def find_node(pkg: str, node_type: str, rospack: RosPack | None = None) -> list[
     """Return the paths of the executables of a name in a package.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     return find_resource(pkg, node_type, lambda path: os.access(path, os.R_OK | os.X_OK), rospack)
 
@@ -209,7 +209,7 @@ def find_resource(
         rospack: Packages to search; those of the process when not given.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     top = Path((rospack or RosPack()).get_path(pkg))
     found = [str(file) for file in Package(pkg, top).files(resource_name)]
@@ -237,7 +237,7 @@ def get_depends(package: str, rospack: RosPack | None = None) -> list[str]:
     """Return a package and all packages that it depends on, the deepest first.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     return [*reversed((rospack or RosPack()).get_depends(package)), package]
 
@@ -277,7 +277,7 @@ def list_package_resources(
         rfilter: Function of a path that returns whether to include it.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     packs = RosPack()
     found = []
@@ -298,7 +298,7 @@ def rospack_depends(pkg: str) -> list[str]:
     """Return the packages that a package depends on.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     return list(RosPack().get_depends(pkg))
 

@@ -93,7 +93,7 @@ def list_srv_types(package: str, include_depends: bool) -> list[str]:
         include_depends: Whether to add those of the packages that it depends on, with them.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     found = list_package_resources(package, include_depends, "srv", lambda p: p.endswith(EXT))
     return [name.removesuffix(EXT) for name in found]
@@ -103,7 +103,7 @@ def srv_file(package: str, type_: str) -> str:
     """Return the path of the definition of a service; it need not exist.
 
     Raises:
-        InvalidROSPkgException: There is no such package.
+        InvalidROSPkgException: The package does not exist.
     """
     return resource_file(package, "srv", type_ + EXT)
 
@@ -112,7 +112,7 @@ def get_pkg_srv_specs(package: str) -> tuple[list[tuple[str, SrvSpec]], list[str
     """Return the services of a package, and the names of those that cannot be read.
 
     Raises:
-        ResourceNotFound: There is no such package.
+        ResourceNotFound: The package does not exist.
     """
     specs: list[tuple[str, SrvSpec]] = []
     failures: list[str] = []

@@ -28,7 +28,7 @@ def parse_file(file: str) -> StackManifest:
 
     Raises:
         ManifestException: The file is not a manifest of a stack.
-        ValueError: There is no such file.
+        ValueError: The file does not exist.
     """
     made = StackManifest()
     manifestlib.parse_file(made, file)

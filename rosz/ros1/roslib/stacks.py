@@ -44,7 +44,7 @@ class ROSStackException(Exception):
 
 
 class InvalidROSStackException(ROSStackException):
-    """There is no such stack."""
+    """The stack does not exist."""
 
 
 def _stacks(env: Variables) -> RosStack:
@@ -86,7 +86,7 @@ def get_stack_dir(stack: str, env: Variables = None) -> str:
         env: Variables to read ``ROS_PACKAGE_PATH`` from; those of the process when not given.
 
     Raises:
-        InvalidROSStackException: There is no such stack.
+        InvalidROSStackException: The stack does not exist.
     """
     try:
         return _stacks(env).get_path(stack)
@@ -98,7 +98,7 @@ def stack_of(pkg: str, env: Variables = None) -> str | None:  # noqa: ARG001  # 
     """Return the name of the stack that a package lies in; None if it lies in none.
 
     Raises:
-        InvalidROSPkgException: There is no such package.
+        InvalidROSPkgException: The package does not exist.
     """
     above = Path(get_pkg_dir(pkg) or "", STACK_FILE).parents
     return next((folder.name for folder in above if (folder / STACK_FILE).is_file()), None)
@@ -139,7 +139,7 @@ def get_stack_version(stack: str, env: Variables = None) -> str | None:
         env: Variables to read ``ROS_PACKAGE_PATH`` from; those of the process when not given.
 
     Raises:
-        InvalidROSStackException: There is no such stack.
+        InvalidROSStackException: The stack does not exist.
     """
     return get_stack_version_by_dir(get_stack_dir(stack, env))
 

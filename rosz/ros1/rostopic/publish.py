@@ -48,7 +48,7 @@ def create_publisher(
         disable_rostime: Whether to use wall time even in simulation.
 
     Raises:
-        ROSTopicException: There is no such type.
+        ROSTopicException: The type does not exist.
     """
     try:
         found = get_message_class(topic_type)
@@ -155,7 +155,7 @@ def file_yaml_arg(filename: str) -> Callable[[], Iterator[list[Any]]]:
     """Return a function that yields the documents of a YAML file, each as a list of arguments.
 
     Raises:
-        ROSTopicException: There is no such file; the function raises it if the file is not YAML.
+        ROSTopicException: The file does not exist; the function raises it if the file is not YAML.
     """
     path = Path(filename)
     if not path.is_file():

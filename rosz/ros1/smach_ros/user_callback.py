@@ -100,7 +100,7 @@ def copy_from(ud: Any, key: str) -> Any:
         key: Key of the value.
 
     Raises:
-        CallbackFailed: There is no such key.
+        CallbackFailed: The key does not exist.
     """
     if key not in ud:
         rospy.logerr(f"user data has no key '{key}'; it has {ud.keys()}")
@@ -117,7 +117,7 @@ def fill(message: Any, ud: Any, slots: Iterable[str]) -> None:
         slots: Fields, which are keys too.
 
     Raises:
-        CallbackFailed: There is no such key.
+        CallbackFailed: The key does not exist.
     """
     for slot in slots:
         setattr(message, slot, copy_from(ud, slot))

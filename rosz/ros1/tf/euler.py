@@ -45,7 +45,7 @@ def resolve_order(axes: Axes) -> tuple[tuple[int, int, int], bool]:
     """Return the axes of the rotations as numbers, and whether they rotate with the body.
 
     Raises:
-        UsageError: There is no such order.
+        UsageError: The order does not exist.
     """
     if isinstance(axes, str):
         if axes.lower() in _ORDERS:
@@ -85,7 +85,7 @@ def euler_from_matrix(matrix: Numbers, axes: Axes = "sxyz") -> tuple[float, floa
         axes: Order of axes.
 
     Raises:
-        UsageError: There is no such order.
+        UsageError: The order does not exist.
     """
     order, moving = resolve_order(axes)
     i, j, last = order[::-1] if moving else order
@@ -118,6 +118,6 @@ def euler_from_quaternion(quaternion: Numbers, axes: Axes = "sxyz") -> tuple[flo
         axes: Order of axes.
 
     Raises:
-        UsageError: There is no such order.
+        UsageError: The order does not exist.
     """
     return euler_from_matrix(rotation_rows(quaternion), axes)

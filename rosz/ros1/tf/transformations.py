@@ -248,7 +248,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") 
         ``[x, y, z, w]``.
 
     Raises:
-        UsageError: There is no such order.
+        UsageError: The order does not exist.
     """
     whole: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
     for axis, angle in _rotations(ai, aj, ak, axes):
@@ -262,7 +262,7 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> Array:
     """Return the 4x4 matrix of three Euler angles; see `quaternion_from_euler`.
 
     Raises:
-        UsageError: There is no such order.
+        UsageError: The order does not exist.
     """
     whole = identity_matrix()
     for axis, angle in _rotations(ai, aj, ak, axes):

@@ -38,7 +38,7 @@ def get_package_share_path(package_name: str, print_warning: bool = True) -> Pat
         print_warning: Ignored.
 
     Raises:
-        PackageNotFoundError: There is no such package.
+        PackageNotFoundError: The package does not exist.
     """
     try:
         return _packages().find(package_name).path
@@ -55,7 +55,7 @@ def get_package_prefix(package_name: str) -> str:
     """Return the folder above ``share`` of an installed package, or the folder of the package.
 
     Raises:
-        PackageNotFoundError: There is no such package.
+        PackageNotFoundError: The package does not exist.
     """
     folder = get_package_share_path(package_name)
     return str(folder.parent.parent if folder.parent.name == "share" else folder)

@@ -88,7 +88,7 @@ class RcutilsLogger:
             Whether messages of that severity are logged.
 
         Raises:
-            TypeError: There is no such option.
+            TypeError: The option does not exist.
         """
         return self._log(int(severity), message, kwargs)
 

@@ -92,7 +92,7 @@ class QoSProfile:
             defaults.
 
     Raises:
-        UsageError: There is no such policy, or neither history nor depth is given.
+        UsageError: The policy does not exist, or neither history nor depth is given.
     """
 
     depth: int

@@ -223,7 +223,7 @@ class BagRun:
 
     @property
     def silent(self) -> bool:
-        """Whether it does not run on although it should, as one that was stopped by a signal."""
+        """Whether its process has stopped reporting, as after SIGSTOP."""
         limit = _FINISH_SECONDS if self._stopping else _SILENT_SECONDS
         return time.monotonic() - self._heard > limit and not self.ended
 

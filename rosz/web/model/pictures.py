@@ -63,7 +63,7 @@ class ImageWatch(TopicWatch):
         topic: Full name of the topic.
 
     Raises:
-        NotFoundError: There is no such topic.
+        NotFoundError: The topic does not exist.
         TypeNotFound: Its type is not known here.
         DefinitionError: Its definition differs from the one here.
         UsageError: Its messages are not images, or a library is not installed.

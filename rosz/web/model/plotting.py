@@ -200,7 +200,7 @@ class Plot:
         """Plot a field, such as ``/turtle1/pose/x``.
 
         Raises:
-            NotFoundError: There is no such topic, or it has no such field.
+            NotFoundError: The topic or the field does not exist.
             UsageError: The path is malformed, or is not of numbers.
         """
         if name in self._topics:

@@ -66,7 +66,7 @@ class Reconfiguration:
 
         Raises:
             UsageError: The page may not.
-            ParamError: There is no such setting, or a value cannot be converted.
+            ParamError: The setting does not exist, or a value cannot be converted.
             ServiceNotFound: The server is gone.
             ServiceError: The server refused the change.
             WaitTimeout: The server did not reply in time.

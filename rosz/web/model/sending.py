@@ -32,7 +32,7 @@ class Sending:
 
     Raises:
         InvalidName: The name is not legal.
-        TypeNotFound: There is no such type.
+        TypeNotFound: The type does not exist.
         UsageError: The page may not publish it.
     """
 

@@ -97,7 +97,7 @@ class TopicWatch:
         received: Number of messages that have come.
 
     Raises:
-        NotFoundError: There is no such topic.
+        NotFoundError: The topic does not exist.
         TypeNotFound: Its type is not known here.
         DefinitionError: Its definition differs from the one here.
     """

@@ -198,7 +198,7 @@ class ImageDisplay:
         look: Its settings.
 
     Raises:
-        NotFoundError: There is no such topic.
+        NotFoundError: The topic does not exist.
         UsageError: A library is not installed.
     """
 
@@ -278,7 +278,7 @@ class TopicDisplay:
         frames: The frames.
 
     Raises:
-        NotFoundError: There is no such topic.
+        NotFoundError: The topic does not exist.
         TypeNotFound: Its type is not known here.
         DefinitionError: Its definition differs from the one here.
     """

@@ -58,7 +58,7 @@ class MarkerDisplay:
         meshes: The meshes that markers name.
 
     Raises:
-        NotFoundError: There is no such topic.
+        NotFoundError: The topic does not exist.
         TypeNotFound: Its type is not known here.
         DefinitionError: Its definition differs from the one here.
     """

@@ -45,7 +45,7 @@ def getCvType(encoding: str) -> int:
     """Return OpenCV's number of the type of images of an encoding, such as ``cv2.CV_8UC3``.
 
     Raises:
-        RuntimeError: There is no such encoding.
+        RuntimeError: The encoding does not exist.
     """
     return type_of(encoding)
 
@@ -72,7 +72,7 @@ def cvtColor2(source: Image, encoding_in: str, encoding_out: str) -> Image:
         encoding_out: The new one; the same one when empty.
 
     Raises:
-        RuntimeError: There is no such encoding or conversion, or the image is none of its encoding.
+        RuntimeError: The encoding or conversion does not exist, or does not fit the image.
     """
     image = np.asarray(source)
     if encoding_out in {"", encoding_in}:
