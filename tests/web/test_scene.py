@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from network import Network, eventually
 
+from rosz.environment import Environment
 from rosz.errors import UsageError
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import (
@@ -25,16 +26,28 @@ from rosz.msgs.geometry_msgs.msg import (
     Vector3,
 )
 from rosz.msgs.geometry_msgs.msg import Pose as PoseMessage
+from rosz.msgs.map_msgs.msg import OccupancyGridUpdate
 from rosz.msgs.nav_msgs.msg import MapMetaData, OccupancyGrid, Path
 from rosz.msgs.sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY, Pose, StaticTransformBroadcaster, TransformBroadcaster
 from rosz.web.model import Frames, Permission, System
-from rosz.web.scene import TOOLS, Look, Setup, Tools, format_setup, read_setup
+from rosz.web.scene import (
+    TOOLS,
+    Look,
+    Meshes,
+    Setup,
+    Tools,
+    format_setup,
+    open_display,
+    read_setup,
+)
 from rosz.web.scene.display import TopicDisplay
 from rosz.web.scene.drawing import Drawing
-from rosz.web.scene.poses import draw_map, draw_path, draw_poses
+from rosz.web.scene.maps import draw_map, read_cells
+from rosz.web.scene.poses import draw_path, draw_poses
 from rosz.web.scene.sensors import draw_cloud, draw_scan
+from rosz.web.scene.still import StillDisplay
 
 ASIDE = Pose((10.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
 """Ten metres along x, and turned back."""
@@ -81,6 +94,9 @@ def test_an_address_holds_the_setup() -> None:
     assert address == "/3d?frame=map&show=tf,/scan;color=%23ff0000;size=4;hidden&view=top"
     assert read_setup("map", "tf,/scan;color=#ff0000;size=4;hidden", "top") == setup
     assert [one.name for one in read_setup("", "", "").looks] == ["grid", "tf"]
+    axes = Setup("map", (Look("axes", frame="a/b", radius=0.5), Look("grid", cells=20)))
+    assert format_setup(axes) == "/3d?frame=map&show=axes;frame=a/b;radius=0.5,grid;cells=20"
+    assert read_setup("map", "axes;frame=/a/b;radius=0.5,grid;cells=20", "") == axes
     assert read_setup("", "/a;size=much", "elsewhere") == Setup("", (Look("/a"),), "orbit")
     assert read_setup("", "/a;size=nan", "").looks == (Look("/a"),)
 
@@ -142,14 +158,79 @@ def test_a_map_has_the_colors_of_rviz() -> None:
     origin = PoseMessage(Point(-1, -2, 0), Quaternion(0, 0, 0, 1))
     info = MapMetaData(resolution=0.5, width=3, height=1, origin=origin)
     drawing = Drawing()
-    text = draw_map(OccupancyGrid(info=info, data=[0, 100, -1]), IDENTITY, Look("/map"), drawing)
-    assert text == "3 x 1 cells of 0.5 m"
+    rows = read_cells(OccupancyGrid(info=info, data=[0, 100, -1]))
+    assert draw_map(info, rows, IDENTITY, Look("/map"), drawing) == "3 x 1 cells of 0.5 m"
     (image,) = parts(drawing)
     assert image["cells"].tolist() == [0, 100, 255]
     assert image["palette"][[0, 100]].tolist() == [[255] * 4, [0, 0, 0, 255]]
     assert np.reshape(image["matrix"], (4, 4)).T[:2].tolist() == [[1.5, 0, 0, -1], [0, 0.5, 0, -2]]
     with pytest.raises(UsageError, match="2 cells; expected 3 x 1"):
-        draw_map(OccupancyGrid(info=info, data=[0, 0]), IDENTITY, Look("/map"), Drawing())
+        read_cells(OccupancyGrid(info=info, data=[0, 0]))
+
+
+def test_updates_change_a_part_of_a_map(network: Network) -> None:
+    robot, page = network.node("robot"), network.node("page")
+    maps = robot.publisher("map", OccupancyGrid, latch=True)
+    updates = robot.publisher("map_updates", OccupancyGridUpdate)
+    system = System(page, Permission())
+    graph = system.graph.use().value
+    eventually(lambda: graph.survey().view.publishers("/map"), "the map")
+    frames = Frames(page)
+    meshes = Meshes(Environment.read({}), lambda _: "")
+    display = open_display(system, graph.survey(), frames, meshes, Look("/map"))
+    header = Header(frame_id="map")
+    info = MapMetaData(resolution=1.0, width=3, height=2)
+    maps.publish(OccupancyGrid(header=header, info=info, data=[0] * 6))
+    eventually(lambda: display.refresh("map"), "the map")
+    eventually(updates.subscribers, "the subscription to updates")
+
+    def cells() -> list[int]:
+        display.refresh("map")
+        (image,) = parts(display.encoded()[0])
+        found: list[int] = image["cells"].tolist()
+        return found
+
+    updates.publish(OccupancyGridUpdate(header, 1, 0, 2, 2, [100, -1, 50, 1]))
+    eventually(lambda: cells() == [0, 100, 255, 0, 50, 1], "the update")
+    assert display.status == "3 x 2 cells of 1 m, 1 updates"
+    updates.publish(OccupancyGridUpdate(header, 2, 0, 2, 2, [0] * 4))
+    eventually(lambda: display.refresh("map"), "the update that does not fit")
+    assert "2 x 2 cells at (2, 0) is not within the map of 3 x 2 cells" in display.fault
+    maps.publish(OccupancyGrid(header=header, info=info, data=[7] * 6))
+    eventually(lambda: cells() == [7] * 6, "the next map")
+    assert (display.fault, display.status) == ("", "3 x 2 cells of 1 m")
+    display.look = Look("/map", visible=False)
+    display.refresh("map")
+    eventually(lambda: not (maps.subscribers() or updates.subscribers()), "no subscription")
+    display.close()
+    frames.close()
+
+
+def test_a_grid_and_axes_are_at_a_frame(network: Network) -> None:
+    page = network.node("page")
+    StaticTransformBroadcaster(network.node("robot")).send(frame("map", "laser", 2.0, 1))
+    frames = Frames(page)
+    eventually(lambda: "laser" in frames.names(), "the frame")
+    axes = StillDisplay(Look("axes", frame="laser", size=2.0, radius=0.25), frames)
+    assert axes.refresh("map")
+    found = parts(axes.encoded()[0])
+    assert np.allclose(found[0]["matrices"][0].diagonal(), (2.0, 0.5, 0.5, 1.0))
+    assert np.allclose(found[0]["matrices"][0, :3, 3], (3.0, 0, 0))
+    assert axes.status == "at 'laser'"
+    assert not axes.refresh("map")
+    axes.look = Look("axes", frame="none")
+    assert axes.refresh("map")
+    assert parts(axes.encoded()[0]) == []
+    assert '"none" passed' in axes.fault
+    grid = StillDisplay(Look("grid", size=0.5, cells=4, frame="laser"), frames)
+    grid.refresh("map")
+    (lines,) = parts(grid.encoded()[0])
+    assert (lines["positions"].min(axis=0).tolist(), lines["positions"].max(axis=0).tolist()) == (
+        [1.0, -1.0, 0.0],
+        [3.0, 1.0, 0.0],
+    )
+    assert grid.status == "4 x 4 cells of 0.5 m"
+    frames.close()
 
 
 def test_paths_and_poses() -> None:

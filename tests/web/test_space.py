@@ -126,3 +126,19 @@ return scene.get_camera().position;
     eventually(lambda: "/scan" not in world.browser.current_url, "the address", LONG)
     assert "show=grid" in world.browser.current_url
     assert world.messages() == []
+
+
+def test_an_empty_view_has_the_color_of_the_page(world: World) -> None:
+    set_screen(world.browser, "laptop", "dark")
+    world.open("/3d?show=/nothing")
+    world.should_see("'/nothing' does not exist yet")
+    colors = """
+const { scene, renderer } = getElement(Number(document.querySelector('.rosz-scene').id.slice(1)));
+const color = scene.background.clone();
+const first = renderer.getClearColor(color.clone()).getHexString();
+return [first, color.getHexString()];
+"""
+    eventually(lambda: world.ask(colors) == ["1b202a", "1b202a"], "a dark view")
+    world.ask("document.body.classList.remove('body--dark')")
+    eventually(lambda: world.ask(colors) == ["1b202a", "e9edf4"], "a light view")
+    assert world.messages() == []

@@ -15,10 +15,6 @@ function load(url, form) {
   return loaded.get(url);
 }
 
-function styleOf(name) {
-  return getComputedStyle(document.body).getPropertyValue(name).trim();
-}
-
 export default class Drawing {
   create_mesh(url) {
     this.mesh = new THREE.Group();
@@ -67,9 +63,6 @@ export default class Drawing {
       this.mesh.remove(one);
     }
     for (const one of added) this.mesh.add(one);
-    let top = this.mesh;
-    while (top.parent) top = top.parent;
-    if (top.isScene) top.background = new THREE.Color(styleOf("--rosz-scene") || "#ffffff");
   }
 
   geometry(part, take) {

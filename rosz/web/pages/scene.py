@@ -15,6 +15,8 @@ from rosz.web.model import IMAGE_TYPES, Frames, System
 from rosz.web.pages.layout import Frame, address_of
 from rosz.web.pages.pointing import Pointing
 from rosz.web.scene import (
+    AXES,
+    GRID,
     Display,
     Look,
     Meshes,
@@ -39,8 +41,8 @@ _CHOICES = {
 }
 """The meanings that the color of a display can have, by its type."""
 _MARKERS = ("Robot", "visualization_msgs/Marker", "visualization_msgs/MarkerArray")
-_OWN_COLORS = frozenset({"Frames", "nav_msgs/OccupancyGrid", *_MARKERS, *IMAGE_TYPES})
-_OWN_SIZES = _OWN_COLORS - {"Frames"} | {"nav_msgs/GridCells", "sensor_msgs/Range"}
+_OWN_COLORS = frozenset({"Axes", "Frames", "nav_msgs/OccupancyGrid", *_MARKERS, *IMAGE_TYPES})
+_OWN_SIZES = _OWN_COLORS - {"Axes", "Frames"} | {"nav_msgs/GridCells", "sensor_msgs/Range"}
 _NEED_COLOR = frozenset(
     {
         "geometry_msgs/PolygonStamped",
@@ -54,8 +56,25 @@ _NEED_COLOR = frozenset(
     }
 )
 """Types that get a color of their own when they are added."""
+_TEXTS = {
+    "Axes": ("frame", "At the frame"),
+    "Grid": ("frame", "At the frame"),
+    "Robot": ("prefix", "Prefix of its frames"),
+}
+_NUMBERS = {
+    "Axes": ("radius", "Radius (m)", float),
+    "Grid": ("cells", "Cells", int),
+    "nav_msgs/Odometry": ("keep", "Keep", int),
+}
+"""More settings of displays, by their types."""
 _UNITS = dict.fromkeys(_CHOICES, "Pixels")
+_BACKGROUND = "getComputedStyle(document.body).getPropertyValue('--rosz-scene').trim()"
+"""What the browser evaluates before its first drawing."""
 _VIEWS = {"orbit": "From the side", "top": "From above"}
+
+
+class _Backdrop(Object3D, component=Path(__file__).with_name("backdrop.js")):
+    """Gives the view the color of the page."""
 
 
 class _Drawn(Object3D, component=Path(__file__).with_name("drawing.js")):
@@ -106,9 +125,14 @@ class _ScenePage:
             with ui.element("div").classes(
                 "w-full grid gap-4 grid-cols-1 lg:grid-cols-[minmax(0,1fr)_19rem]"
             ):
-                self._scene = ui.scene(grid=False, background_color="#f4f6fa", fps=30).classes(
-                    "rosz-card w-full overflow-hidden rosz-scene"
+                self._scene = (
+                    ui.scene(grid=False, fps=30)
+                    .props(remove="background-color")
+                    .props(f':background-color="{_BACKGROUND}"')
+                    .classes("rosz-card w-full overflow-hidden rosz-scene")
                 )
+                with self._scene:
+                    _Backdrop()
                 self._list = ui.column().classes("w-full gap-2 min-w-0")
         self._pointing.add_pointer(self._scene)
         frame.keep(self)
@@ -203,7 +227,7 @@ class _ScenePage:
     # Lists and states.
 
     def _refresh_lists(self) -> None:
-        shown = {one.look.name for one in self._shown}
+        shown = {one.look.name for one in self._shown} - {AXES, GRID}
         options = {
             name: f"{name} ({kind})"
             for name, kind in list_displays(self._graph.survey()).items()
@@ -270,8 +294,8 @@ class _Shown:
                     f'flat dense round size=sm aria-label="Remove {look.name}"'
                 )
             self._status = ui.label("").classes("rosz-soft rosz-number text-xs")
-            self._fault = ui.label("").classes("text-negative text-xs")
-            self._settings = ui.row().classes("w-full items-center gap-2 no-wrap pr-2")
+            self._fault = ui.label("").classes("rosz-state-bad text-xs")
+            self._settings = ui.row().classes("w-full items-center gap-2 pr-2")
         self._settings.set_visibility(False)
         self._fault.set_visibility(False)
 
@@ -281,7 +305,7 @@ class _Shown:
     def _add_settings(self, kind: str) -> None:
         choices = _CHOICES.get(kind, {})
         self._tune.set_visibility(
-            kind not in _OWN_COLORS & _OWN_SIZES or bool(choices) or kind == "Robot"
+            kind not in _OWN_COLORS & _OWN_SIZES or bool(choices) or kind in _TEXTS
         )
         with self._settings:
             if choices:
@@ -304,19 +328,21 @@ class _Shown:
                     step=0.1,
                     on_change=lambda e: self._set(size=float(e.value or 0)),
                 ).props("dense").classes("w-20")
-            if kind == "nav_msgs/Odometry":
+            if kind in _NUMBERS:
+                key, title, form = _NUMBERS[kind]
                 ui.number(
-                    "Keep",
-                    value=self.look.keep or None,
-                    min=1,
-                    precision=0,
-                    on_change=lambda e: self._set(keep=int(e.value or 0)),
+                    title,
+                    value=getattr(self.look, key) or None,
+                    min=0,
+                    precision=0 if form is int else None,
+                    on_change=lambda e: self._set(**{key: form(e.value or 0)}),
                 ).props("dense").classes("w-20")
-            if kind == "Robot":
+            if kind in _TEXTS:
+                field, label = _TEXTS[kind]
                 ui.input(
-                    "Prefix of its frames",
-                    value=self.look.prefix,
-                    on_change=lambda e: self._set(prefix=str(e.value or "").strip("/")),
+                    label,
+                    value=getattr(self.look, field),
+                    on_change=lambda e: self._set(**{field: str(e.value or "").strip("/")}),
                 ).props("dense debounce=400").classes("grow min-w-0")
 
     def _set(self, **changes: Any) -> None:

@@ -8,6 +8,7 @@ from rosz.web.scene.display import Display
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.opening import list_displays, open_display
 from rosz.web.scene.setup import (
+    AXES,
     DEFAULT,
     DESCRIPTION,
     GRID,
@@ -21,6 +22,7 @@ from rosz.web.scene.setup import (
 from rosz.web.scene.tools import TOOLS, Tools
 
 __all__ = (
+    "AXES",
     "DEFAULT",
     "DESCRIPTION",
     "GRID",

@@ -29,7 +29,6 @@ __all__ = (
     "DRAWN_TYPES",
     "Display",
     "FrameDisplay",
-    "GridDisplay",
     "ImageDisplay",
     "TopicDisplay",
 )
@@ -49,7 +48,6 @@ _DRAW: dict[str, _Draw] = {
     "geometry_msgs/PoseWithCovarianceStamped": poses.draw_stamped_pose,
     "geometry_msgs/WrenchStamped": poses.draw_wrench,
     "nav_msgs/GridCells": poses.draw_cells,
-    "nav_msgs/OccupancyGrid": poses.draw_map,
     "nav_msgs/Odometry": poses.draw_stamped_pose,
     "nav_msgs/Path": poses.draw_path,
     "sensor_msgs/LaserScan": sensors.draw_scan,
@@ -58,8 +56,6 @@ _DRAW: dict[str, _Draw] = {
     "sensor_msgs/Range": sensors.draw_range,
 }
 DRAWN_TYPES = frozenset(_DRAW)
-_NOW = frozenset({"nav_msgs/OccupancyGrid"})
-"""Types that stay where their frame is now, not where it was when they were made."""
 
 
 class Display(Protocol):
@@ -85,38 +81,6 @@ class Display(Protocol):
 
     def close(self) -> None:
         """Unsubscribe."""
-
-
-class GridDisplay:
-    """The grid on the ground.
-
-    Args:
-        look: Its settings.
-    """
-
-    kind = "Grid"
-    fault = ""
-
-    def __init__(self, look: Look) -> None:
-        self.look = look
-        self.status = ""
-        self._shown: Look | None = None
-
-    def refresh(self, fixed: str) -> bool:
-        """Return whether the settings changed."""
-        del fixed
-        return self._shown is not self.look
-
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the grid."""
-        self._shown = self.look
-        drawing = Drawing()
-        if self.look.visible:
-            self.status = poses.draw_grid(self.look, drawing)
-        return drawing.encode(), MEDIA
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 class FrameDisplay:
@@ -320,7 +284,6 @@ class TopicDisplay:
             frame, stamp = read_frame(payload, self.kind), read_stamp(payload, self.kind)
         with self._lock:
             self.received += 1
-            stamp = 0 if self.kind in _NOW else stamp
             self._kept.append(_Kept(payload, frame, stamp, self.received))
             while len(self._kept) > 1 and sum(len(one.payload) for one in self._kept) > _MOST_BYTES:
                 self._kept.popleft()

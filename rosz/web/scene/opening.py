@@ -13,26 +13,27 @@ from rosz.web.scene.display import (
     DRAWN_TYPES,
     Display,
     FrameDisplay,
-    GridDisplay,
     ImageDisplay,
     TopicDisplay,
 )
+from rosz.web.scene.maps import MAP_TYPE, UPDATES, MapDisplay
 from rosz.web.scene.markers import MARKER_TYPES, MarkerDisplay
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.robot import RobotDisplay
-from rosz.web.scene.setup import DESCRIPTION, GRID, ROBOT, TF, Look
+from rosz.web.scene.setup import AXES, DESCRIPTION, GRID, ROBOT, TF, Look
+from rosz.web.scene.still import STILL, StillDisplay
 
 if TYPE_CHECKING:
     from rosz.introspect.survey import Survey
 
 __all__ = ("list_displays", "open_display")
 
-_TYPES = DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES
+_TYPES = DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES | {MAP_TYPE}
 
 
 def list_displays(survey: Survey) -> dict[str, str]:
     """Return the names of all displays that there can be, with what they show."""
-    found = {GRID: "grid", TF: "frames", ROBOT: DESCRIPTION}
+    found = {GRID: "grid", AXES: "of a frame", TF: "frames", ROBOT: DESCRIPTION}
     topics = {
         one.name: short_type(kind)
         for one in list_topics(survey.view.tokens)
@@ -58,19 +59,34 @@ def open_display(
         RoszError: It cannot be opened, or not yet.
     """
     name, node = look.name, system.node
-    if name == GRID:
-        return GridDisplay(look)
+    if name in STILL:
+        return StillDisplay(look, frames)
     if name == TF:
         return FrameDisplay(look, frames)
     if name.partition(":")[0] == ROBOT:
         system.permission.check("get", name.partition(":")[2] or DESCRIPTION)
         return RobotDisplay(node, look, frames, meshes)
+    return _open_topic(system, survey, frames, meshes, look)
+
+
+def _open_topic(
+    system: System, survey: Survey, frames: Frames, meshes: Meshes, look: Look
+) -> Display:
+    """Open the display of a topic.
+
+    Raises:
+        RoszError: It cannot be opened, or not yet.
+    """
+    name, node = look.name, system.node
     system.permission.check("subscribe", name)
     types = [short_type(one) for one in topic_types(survey.view).get(name, ())]
     if not types:
         raise NotFoundError(f"topic '{name}' does not exist yet")
     if types[0] in MARKER_TYPES:
         return MarkerDisplay(node, survey, look, frames, meshes)
+    if types[0] == MAP_TYPE:
+        unseen = system.permission.objection("subscribe", name + UPDATES)
+        return MapDisplay(node, survey, look, frames, unseen)
     if types[0] in IMAGE_TYPES:
         return ImageDisplay(node, survey, look)
     if types[0] not in DRAWN_TYPES:

@@ -1,4 +1,4 @@
-"""Poses, paths, polygons, points and maps."""
+"""Poses, paths, polygons and points."""
 
 from __future__ import annotations
 
@@ -8,18 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from rosz.errors import UsageError
 from rosz.transforms import Pose, compose
 from rosz.web.scene.colors import color_bytes
-from rosz.web.scene.drawing import Array, Drawing, matrix_of, moved, placed
+from rosz.web.scene.drawing import Drawing, matrix_of, moved, placed
 from rosz.web.scene.setup import Look
 from rosz.web.scene.shapes import draw_arrows, draw_line
 
 __all__ = (
     "Trail",
     "draw_cells",
-    "draw_grid",
-    "draw_map",
     "draw_path",
     "draw_point",
     "draw_polygon",
@@ -33,8 +30,6 @@ __all__ = (
 _LENGTH = 1.0
 _THIN = 0.005
 _SHORT = 0.3
-_MOST_CELLS = 4096
-_GRID_CELLS = 10
 _KEPT = 100
 """Number of poses of an odometry that stay drawn, as in rviz."""
 _STEP, _TURN = 0.1, 0.1
@@ -189,76 +184,3 @@ def draw_point(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     size = look.size or 0.2
     drawing.shapes("sphere", placed(place, size, size, size), color_bytes(look.color, "#cc29cc"))
     return ", ".join(f"{name} {value:.2f}" for name, value in zip("xyz", place[0], strict=True))
-
-
-def draw_map(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
-    """Draw an OccupancyGrid, with the colors of rviz.
-
-    Raises:
-        UsageError: The number of cells is not that of its size.
-    """
-    info = message.info
-    cells = np.frombuffer(_bytes_of(message.data), np.uint8)
-    if len(cells) != info.width * info.height:
-        raise UsageError(f"the map has {len(cells)} cells; expected {info.width} x {info.height}")
-    if not len(cells):
-        return "0 cells"
-    rows = cells.reshape(info.height, info.width)
-    step = -(-max(rows.shape) // _MOST_CELLS)
-    place = compose(pose, pose_from(info.origin))
-    width, height = info.width * info.resolution, info.height * info.resolution
-    palette = _PALETTE.copy()
-    if look.color == "costmap":
-        palette = _COSTS.copy()
-    drawing.image(rows[::step, ::step], placed(place, width, height), palette)
-    part = f", every {step}th is drawn" if step > 1 else ""
-    return f"{info.width} x {info.height} cells of {info.resolution:g} m{part}"
-
-
-def _bytes_of(data: Any) -> bytes:
-    """Return a sequence of int8 as bytes."""
-    if isinstance(data, bytes | bytearray | memoryview):
-        return bytes(data)
-    return np.asarray(data).astype(np.int8).tobytes()
-
-
-def _map_palette() -> Array:
-    palette = np.full((256, 4), 255, dtype=np.uint8)
-    gray = 255 - np.arange(101) * 255 // 100
-    palette[:101, :3] = gray[:, None]
-    palette[101:128, :3] = (0, 255, 0)
-    palette[128:255, 0] = 255
-    palette[128:255, 1] = np.arange(127) * 255 // 126
-    palette[128:255, 2] = 0
-    palette[255] = (112, 137, 134, 255)
-    return palette
-
-
-def _cost_palette() -> Array:
-    palette = _map_palette()
-    palette[0] = (0, 0, 0, 0)
-    part = np.arange(1, 99)
-    palette[1:99, 0], palette[1:99, 1] = part * 255 // 100, 0
-    palette[1:99, 2] = 255 - part * 255 // 100
-    palette[99], palette[100] = (0, 255, 255, 255), (255, 0, 255, 255)
-    return palette
-
-
-_PALETTE, _COSTS = _map_palette(), _cost_palette()
-
-
-def draw_grid(look: Look, drawing: Drawing) -> str:
-    """Draw a grid on the plane z = 0 of the fixed frame; its size is that of a cell."""
-    size = look.size or 1.0
-    reach = _GRID_CELLS * size / 2
-    at = np.linspace(-reach, reach, _GRID_CELLS + 1)
-    edge = np.full_like(at, reach)
-    zero = np.zeros_like(at)
-    ends = np.concatenate(
-        [
-            np.stack([np.column_stack((at, -edge, zero)), np.column_stack((at, edge, zero))], 1),
-            np.stack([np.column_stack((-edge, at, zero)), np.column_stack((edge, at, zero))], 1),
-        ]
-    )
-    drawing.lines(ends.reshape(-1, 3), color_bytes(look.color, "#8a94a6"))
-    return f"{_GRID_CELLS} x {_GRID_CELLS} cells of {size:g} m"

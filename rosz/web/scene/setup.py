@@ -1,8 +1,8 @@
 """The settings of the view, as the address of the page holds them.
 
 ``/3d?frame=map&show=grid,tf,/scan;color=%23ff0000;size=4,/map;hidden`` names the fixed frame and
-the displays, with commas between; a display is the name of a topic, or ``grid``, ``tf`` or
-``robot``, and what differs from its defaults.
+the displays, with commas between; a display is the name of a topic, or ``grid``, ``axes``, ``tf``
+or ``robot``, and what differs from its defaults.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from urllib.parse import urlencode
 import msgspec
 
 __all__ = (
+    "AXES",
     "DEFAULT",
     "DESCRIPTION",
     "GRID",
@@ -24,24 +25,28 @@ __all__ = (
     "read_setup",
 )
 
-GRID, TF, ROBOT = "grid", "tf", "robot"
+AXES, GRID, TF, ROBOT = "axes", "grid", "tf", "robot"
 DESCRIPTION = "/robot_description"
 """The parameter of the robot that has no other name."""
 _BETWEEN, _WITHIN = ",", ";"
 _MOST_SIZE = 1000.0
 _MOST_KEPT = 100_000
+_MOST_GRID_CELLS = 1000
 
 
 class Look(msgspec.Struct, frozen=True):
     """Settings of a display.
 
     Attributes:
-        name: Full name of a topic, or ``grid``, ``tf`` or ``robot``.
+        name: Full name of a topic, or ``grid``, ``axes``, ``tf`` or ``robot``.
         color: ``#rrggbb``, ``height``, ``intensity`` or ``rgb``; empty for the default.
         size: Size in the unit of the display; 0 for the default.
         visible: Whether it is drawn.
         keep: Number of poses of an odometry that stay drawn; 0 for the default.
         prefix: What is before the names of the frames of a robot (``tf_prefix``).
+        frame: Frame that a grid or axes are at; empty for the fixed frame.
+        radius: Radius of axes in metres; 0 for the default.
+        cells: Number of cells of a grid along one side; 0 for the default.
     """
 
     name: str
@@ -50,6 +55,9 @@ class Look(msgspec.Struct, frozen=True):
     visible: bool = True
     keep: int = 0
     prefix: str = ""
+    frame: str = ""
+    radius: float = 0.0
+    cells: int = 0
 
 
 class Setup(msgspec.Struct, frozen=True):
@@ -78,20 +86,29 @@ def read_setup(frame: str, show: str, view: str) -> Setup:
 def _read_look(text: str) -> Look:
     name, *settings = text.strip().split(_WITHIN)
     found = dict(one.partition("=")[::2] for one in settings)
-    try:
-        size = float(found.get("size", 0))
-    except ValueError:
-        size = 0.0
-    size = min(max(size, 0.0), _MOST_SIZE) if math.isfinite(size) else 0.0
-    keep = int(found["keep"]) if found.get("keep", "").isdecimal() else 0
     return Look(
         name,
         found.get("color", ""),
-        size,
+        _read_length(found.get("size", "")),
         "hidden" not in found,
-        keep=min(keep, _MOST_KEPT),
+        keep=_read_count(found.get("keep", ""), _MOST_KEPT),
         prefix=found.get("prefix", "").strip("/"),
+        frame=found.get("frame", "").removeprefix("/"),
+        radius=_read_length(found.get("radius", "")),
+        cells=_read_count(found.get("cells", ""), _MOST_GRID_CELLS),
     )
+
+
+def _read_length(text: str) -> float:
+    try:
+        length = float(text or 0)
+    except ValueError:
+        return 0.0
+    return min(max(length, 0.0), _MOST_SIZE) if math.isfinite(length) else 0.0
+
+
+def _read_count(text: str, most: int) -> int:
+    return min(int(text), most) if text.isdecimal() else 0
 
 
 def format_setup(setup: Setup) -> str:
@@ -104,14 +121,10 @@ def format_setup(setup: Setup) -> str:
 
 def _format_look(look: Look) -> str:
     parts = [look.name]
-    if look.color:
-        parts.append(f"color={look.color}")
-    if look.size:
-        parts.append(f"size={look.size:g}")
-    if look.keep:
-        parts.append(f"keep={look.keep}")
-    if look.prefix:
-        parts.append(f"prefix={look.prefix}")
+    for key in ("color", "size", "keep", "prefix", "frame", "radius", "cells"):
+        value = getattr(look, key)
+        if value:
+            parts.append(f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}")
     if not look.visible:
         parts.append("hidden")
     return _WITHIN.join(parts)

@@ -54,12 +54,19 @@ def draw_arrows(
     drawing.shapes("cone", poses @ tip, colors)
 
 
-def draw_axes(drawing: Drawing, poses: list[Pose], length: float) -> None:
-    """Draw the axes of frames: x red, y green, z blue."""
+def draw_axes(drawing: Drawing, poses: list[Pose], length: float, width: float = 0.0) -> None:
+    """Draw the axes of frames: x red, y green, z blue.
+
+    Args:
+        drawing: The drawing.
+        poses: Poses of the frames.
+        length: Length of an axis in metres.
+        width: Its diameter in metres; 0 for what fits the length.
+    """
     if not poses:
         return
     matrices = np.array([matrix_of(pose) for pose in poses])
-    thin = length / 12
+    thin = width or length / 12
     for axis, color in _AXES:
         size = [length if part else thin for part in axis]
         local = np.diag((*size, 1.0))

@@ -1,0 +1,236 @@
+"""Maps, and the updates of parts of them that come beside (``/map`` and ``/map_updates``)."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rosz.errors import TransformError, UsageError
+from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.msgs.map_msgs.msg import OccupancyGridUpdate
+from rosz.names import short_type
+from rosz.transforms import Pose, compose
+from rosz.web.model import Frames
+from rosz.web.scene.drawing import MEDIA, Array, Drawing, placed
+from rosz.web.scene.poses import pose_from
+from rosz.web.scene.setup import Look
+
+if TYPE_CHECKING:
+    from rosz.introspect.survey import Survey
+    from rosz.node import Node
+
+__all__ = ("MAP_TYPE", "UPDATES", "MapDisplay", "draw_map", "read_cells", "update_cells")
+
+MAP_TYPE = "nav_msgs/OccupancyGrid"
+UPDATES = "_updates"
+"""What the topic of updates has after the name of the topic of the map."""
+_MOST_CELLS = 4096
+_QUEUE = 10
+
+
+class MapDisplay:
+    """The newest map of a topic, with the updates since.
+
+    It stays where its frame is now, not where it was when the map was made.
+
+    Args:
+        node: The node that subscribes to it.
+        survey: The running nodes.
+        look: Its settings.
+        frames: The frames.
+        unseen: Reason why the page may not receive updates; empty if it may.
+
+    Raises:
+        NotFoundError: The topic does not exist.
+        DefinitionError: Its definition differs from the one here.
+    """
+
+    kind = MAP_TYPE
+
+    def __init__(
+        self, node: Node, survey: Survey, look: Look, frames: Frames, unseen: str = ""
+    ) -> None:
+        token = find_token(survey.view, look.name, topic_types(survey.view)[look.name][0])
+        self.look = look
+        self.kind = short_type(token.type_name)
+        self.status: str = ""
+        self.fault: str = ""
+        self._node = node
+        self._cls = find_class(node.context, token)
+        self._frames = frames
+        self._unseen = unseen
+        self._lock = threading.Lock()
+        self._map: Any = None
+        self._rows: Array = np.zeros((0, 0), np.uint8)
+        self._updates = 0
+        self._refused = unseen
+        self._version = 0
+        self._place: tuple[str, Pose] | None = None
+        self._shown: tuple[Any, ...] = ()
+        self._subscriptions: list[Any] = []
+
+    def _receive(self, message: Any) -> None:
+        with self._lock:
+            self._version += 1
+            self._map, self._updates, self._refused = None, 0, self._unseen
+            try:
+                self._rows = read_cells(message)
+            except UsageError as error:
+                self._refused = str(error)
+                return
+            self._map = message
+
+    def _update(self, message: Any) -> None:
+        with self._lock:
+            if self._map is None:
+                return
+            self._version += 1
+            try:
+                update_cells(self._rows, message)
+            except UsageError as error:
+                self._refused = str(error)
+                return
+            self._updates += 1
+
+    def refresh(self, fixed: str) -> bool:
+        """Return whether the map changed or moved."""
+        if self.look.visible != bool(self._subscriptions):
+            self._switch()
+        with self._lock:
+            found, fault = self._map, self._refused
+        if found is not None:
+            frame = found.header.frame_id.removeprefix("/")
+            try:
+                self._place = fixed, self._frames.find(fixed, frame)
+            except TransformError:
+                fault = self._frames.why_not(fixed, frame)
+                if self._place is not None and self._place[0] != fixed:
+                    self._place = None
+        self.fault = fault
+        return self._shown != (self.look, self._version, self._place)
+
+    def _switch(self) -> None:
+        """Subscribe when it is shown, and unsubscribe when it is hidden."""
+        if not self.look.visible:
+            self.close()
+            with self._lock:
+                self._map, self._version = None, self._version + 1
+            self.status, self._place = "", None
+            return
+        self._subscriptions = [
+            self._node.subscription(self.look.name, self._cls, self._receive, queue_size=_QUEUE)
+        ]
+        if not self._unseen:
+            self._subscriptions.append(
+                self._node.subscription(
+                    self.look.name + UPDATES, OccupancyGridUpdate, self._update, queue_size=_QUEUE
+                )
+            )
+
+    def encoded(self) -> tuple[bytes, str]:
+        """Return the drawing of the map."""
+        with self._lock:
+            place = self._place
+            self._shown = self.look, self._version, place
+            found, updates = self._map, self._updates
+            rows = self._rows.copy() if found is not None else self._rows
+        drawing = Drawing()
+        if found is not None and place is not None and self.look.visible:
+            text = draw_map(found.info, rows, place[1], self.look, drawing)
+            self.status = f"{text}, {updates} updates" if updates else text
+        return drawing.encode(), MEDIA
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        subscriptions, self._subscriptions = self._subscriptions, []
+        for one in subscriptions:
+            one.close()
+
+
+def read_cells(message: Any) -> Array:
+    """Return the cells of a map as bytes, in rows along x.
+
+    Raises:
+        UsageError: The number of cells is not that of its size.
+    """
+    info = message.info
+    return _read_rows(message.data, info.width, info.height, "map")
+
+
+def update_cells(rows: Array, update: Any) -> None:
+    """Write an update into the cells of a map.
+
+    Raises:
+        UsageError: It is not within the map, or the number of its cells is not that of its size.
+    """
+    part = _read_rows(update.data, update.width, update.height, "update of the map")
+    x, y = update.x, update.y
+    height, width = rows.shape
+    if x < 0 or y < 0 or x + update.width > width or y + update.height > height:
+        raise UsageError(
+            f"an update of {update.width} x {update.height} cells at ({x}, {y}) is not within the"
+            f" map of {width} x {height} cells"
+        )
+    rows[y : y + update.height, x : x + update.width] = part
+
+
+def _read_rows(data: Any, width: int, height: int, what: str) -> Array:
+    cells = np.frombuffer(_bytes_of(data), np.uint8)
+    if len(cells) != width * height:
+        raise UsageError(f"the {what} has {len(cells)} cells; expected {width} x {height}")
+    return cells.reshape(height, width).copy()
+
+
+def _bytes_of(data: Any) -> bytes:
+    """Return a sequence of int8 as bytes."""
+    if isinstance(data, bytes | bytearray | memoryview):
+        return bytes(data)
+    return np.asarray(data).astype(np.int8).tobytes()
+
+
+def draw_map(info: Any, rows: Array, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw the cells of an OccupancyGrid, with the colors of rviz.
+
+    Args:
+        info: The MapMetaData of the map.
+        rows: Its cells.
+        pose: Pose of its frame in the fixed frame.
+        look: Settings of the display.
+        drawing: The drawing.
+    """
+    if not rows.size:
+        return "0 cells"
+    step = -(-max(rows.shape) // _MOST_CELLS)
+    place = compose(pose, pose_from(info.origin))
+    width, height = info.width * info.resolution, info.height * info.resolution
+    palette = (_COSTS if look.color == "costmap" else _PALETTE).copy()
+    drawing.image(rows[::step, ::step], placed(place, width, height), palette)
+    part = f", every {step}th is drawn" if step > 1 else ""
+    return f"{info.width} x {info.height} cells of {info.resolution:g} m{part}"
+
+
+def _map_palette() -> Array:
+    palette = np.full((256, 4), 255, dtype=np.uint8)
+    gray = 255 - np.arange(101) * 255 // 100
+    palette[:101, :3] = gray[:, None]
+    palette[101:128, :3] = (0, 255, 0)
+    palette[128:255, 0] = 255
+    palette[128:255, 1] = np.arange(127) * 255 // 126
+    palette[128:255, 2] = 0
+    palette[255] = (112, 137, 134, 255)
+    return palette
+
+
+def _cost_palette() -> Array:
+    palette = _map_palette()
+    palette[0] = (0, 0, 0, 0)
+    part = np.arange(1, 99)
+    palette[1:99, 0], palette[1:99, 1] = part * 255 // 100, 0
+    palette[1:99, 2] = 255 - part * 255 // 100
+    palette[99], palette[100] = (0, 255, 255, 255), (255, 0, 255, 255)
+    return palette
+
+
+_PALETTE, _COSTS = _map_palette(), _cost_palette()
