@@ -3,7 +3,8 @@
 Everything in rosz that runs on a thread of its own goes through a `Worker`: tasks of the parameter
 store, service calls, log records on their way out, text for a slow terminal. A worker either has a
 queue of its own, filled by `Worker.submit` and `Worker.offer`, or receives from a queue that
-somebody else fills, such as a Zenoh channel.
+somebody else fills, such as a Zenoh channel. What has something to do only now and then borrows a
+thread for it with `lend_thread`.
 """
 
 from __future__ import annotations
@@ -11,22 +12,26 @@ from __future__ import annotations
 import heapq
 import itertools
 import logging
+import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from rosz.errors import ClosedError
-from rosz.program import current, within
+from rosz.program import Program, current, within
 
-__all__ = ("Worker", "run_task", "start_thread")
+__all__ = ("Worker", "lend_thread", "run_task", "start_thread")
 
 T = TypeVar("T")
 
 _log = logging.getLogger("rosz.worker")
 _CLOSE_TIMEOUT = 2.0
+_LENT_SECONDS = 5.0
+"""How long a thread that was lent waits for the next task."""
 
 
 def start_thread(thread: threading.Thread) -> bool:
@@ -56,6 +61,58 @@ def start_thread(thread: threading.Thread) -> bool:
 def run_task(task: Callable[[], object]) -> None:
     """Call a task; the default handler of a `Worker` whose items are functions."""
     task()
+
+
+def lend_thread(task: Callable[[], object]) -> bool:
+    """Call a function on a thread that nobody uses; any thread, and any signal handler, may do so.
+
+    There are as many such threads as there are tasks at the same time. They are daemons. A task
+    belongs to the program of its caller; see `rosz.program.current`.
+
+    Args:
+        task: The function; an exception that it raises is logged.
+
+    Returns:
+        Whether it will be called: false if no thread is free, and none can be started since the
+        process ends or has too many.
+    """
+    work = current(), task
+    try:
+        _free_threads.pop().put(work)
+    except IndexError:
+        name = "rosz-lent"
+        with within(None), suppress(RuntimeError):
+            return start_thread(threading.Thread(target=_lend, args=work, name=name, daemon=True))
+        return False
+    return True
+
+
+def _lend(program: Program | None, task: Callable[[], object]) -> None:
+    """Call a task, and then those that come within the time for which a thread is kept."""
+    free, tasks = _free_threads, SimpleQueue[_Task]()
+    while True:
+        try:
+            with within(program):
+                task()
+        except Exception:  # noqa: BLE001  # the thread outlives what a task raises
+            _log.exception("a task on a thread that was lent failed")
+        del program, task
+        free.append(tasks)
+        try:
+            program, task = tasks.get(timeout=_LENT_SECONDS)
+        except Empty:
+            try:
+                free.remove(tasks)
+            except ValueError:  # it was lent at this moment
+                program, task = tasks.get()
+            else:
+                return
+
+
+_Task = tuple[Program | None, Callable[[], object]]
+_free_threads: deque[SimpleQueue[_Task]] = deque()
+"""Where the threads that nobody uses take their next tasks from."""
+os.register_at_fork(after_in_child=_free_threads.clear)
 
 
 class _Delayed:

@@ -1,17 +1,18 @@
-"""The bounded worker: order, bounds, delays, and what happens where there are no threads."""
+"""The bounded worker, and lent threads: order, bounds, delays, and where there are no threads."""
 
 from __future__ import annotations
 
 import logging
 import threading
+from collections import deque
 from queue import SimpleQueue
 
 import pytest
-from network import TIMEOUT, Network
+from network import TIMEOUT, Network, eventually
 
 from rosz import worker
 from rosz.errors import ClosedError
-from rosz.worker import Worker, start_thread
+from rosz.worker import Worker, lend_thread, start_thread
 
 
 def test_items_are_handled_in_order_on_one_thread() -> None:
@@ -209,3 +210,80 @@ def test_starting_a_thread_twice_is_an_error() -> None:
     with pytest.raises(RuntimeError, match="once"):
         start_thread(thread)
     thread.join()
+
+
+def test_as_many_threads_are_lent_as_there_are_tasks() -> None:
+    all_at_once = threading.Barrier(20)
+    done: SimpleQueue[threading.Thread] = SimpleQueue()
+
+    def task() -> None:
+        all_at_once.wait(TIMEOUT)
+        done.put(threading.current_thread())
+
+    assert all(lend_thread(task) for _ in range(20))
+    threads = {done.get(timeout=TIMEOUT) for _ in range(20)}
+    assert len(threads) == 20
+    assert all(thread.daemon for thread in threads)
+
+
+def test_a_thread_is_lent_again_after_a_task_that_fails(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(worker, "_free_threads", deque())
+    used: SimpleQueue[int] = SimpleQueue()
+
+    def task() -> None:
+        used.put(threading.get_ident())
+        raise ValueError("no such thing")
+
+    with caplog.at_level(logging.ERROR):
+        assert lend_thread(task)
+        eventually(lambda: bool(worker._free_threads), "the end of the task")
+        assert lend_thread(task)
+    assert used.get(timeout=TIMEOUT) == used.get(timeout=TIMEOUT)
+    assert "no such thing" in caplog.text
+
+
+def test_a_thread_that_nobody_uses_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "_LENT_SECONDS", 0.0)
+    monkeypatch.setattr(worker, "_free_threads", deque())
+    used: SimpleQueue[threading.Thread] = SimpleQueue()
+    for _ in range(200):  # some while a thread is about to end
+        assert lend_thread(lambda: used.put(threading.current_thread()))
+    threads = {used.get(timeout=TIMEOUT) for _ in range(200)}
+    for thread in threads:
+        thread.join(TIMEOUT)
+    assert not any(thread.is_alive() for thread in threads)
+    assert not worker._free_threads
+
+
+def test_no_thread_is_lent_where_the_system_has_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: threading.Thread) -> bool:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(worker, "start_thread", refuse)
+    monkeypatch.setattr(worker, "_free_threads", deque())
+    assert not lend_thread(threading.get_ident)
+
+
+FORK = """
+import os
+from queue import SimpleQueue
+from rosz.worker import lend_thread
+
+done = SimpleQueue()
+lend_thread(lambda: done.put("parent"))
+print(done.get(), flush=True)
+child = os.fork()
+if not child:
+    lend_thread(lambda: done.put("child"))
+    print(done.get(), flush=True)
+    os._exit(0)
+os.waitpid(child, 0)
+"""
+
+
+def test_threads_are_lent_in_a_forked_child(network: Network) -> None:
+    program = network.program(FORK)
+    assert program.exit_code() == 0
+    assert program.lines == ["parent", "child"]

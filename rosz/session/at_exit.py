@@ -18,7 +18,7 @@ from typing import Any
 
 from rosz.errors import ClosedError
 
-__all__ = ("ENDING", "ClosedSession", "leak_at_exit", "wait_for_calls")
+__all__ = ("ENDING", "OPEN", "ClosedSession", "leak_at_exit", "wait_for_calls")
 
 ENDING = threading.Event()
 """Set when the interpreter is about to end: from then on nobody may start to wait inside Zenoh.
@@ -26,6 +26,9 @@ ENDING = threading.Event()
 The function that calls Zenoh has to check it itself. Then either `wait_for_calls` sees that
 function on a stack, or the function sees that this is set.
 """
+
+OPEN: set[object] = set()
+"""What threads that Zenoh started add items to. Such a thread removes it when it leaves Python."""
 
 _leaked: list[object] = []
 _PACKAGE = str(Path(__file__).parent)
@@ -40,9 +43,9 @@ def leak_at_exit(thing: object) -> None:
 
 
 def wait_for_calls(timeout: float) -> bool:
-    """Set `ENDING`, and wait until no other thread is inside a function of this package.
+    """Set `ENDING`, and wait until nothing is `OPEN`, and no other thread inside this package.
 
-    A thread with such a function anywhere on its stack may be inside Zenoh, or return to it.
+    A thread with a function of it anywhere on its stack may be inside Zenoh, or return to it.
 
     Args:
         timeout: Time limit in seconds.
@@ -53,7 +56,7 @@ def wait_for_calls(timeout: float) -> bool:
     ENDING.set()
     deadline = time.monotonic() + timeout
     own = threading.get_ident()
-    while any(
+    while OPEN or any(
         _is_in_package(frame)
         for thread, frame in sys._current_frames().items()  # noqa: SLF001  # a documented function
         if thread != own

@@ -8,6 +8,7 @@ aborts at its end when a foreign thread asks for it.
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -16,9 +17,18 @@ from typing import Any, Protocol, TypeVar
 
 import zenoh
 
-from rosz.worker import Worker
+from rosz.program import current, within
+from rosz.session.at_exit import OPEN
+from rosz.worker import lend_thread
 
-__all__ = ("Channel", "declare", "declare_rare", "open_channel", "waits_in_zenoh")
+__all__ = (
+    "CallbackQueue",
+    "Channel",
+    "declare",
+    "declare_callback",
+    "declare_rare",
+    "open_channel",
+)
 
 T = TypeVar("T")
 
@@ -81,32 +91,52 @@ def declare_rare(declaring: Callable[[Any], T]) -> tuple[T, Channel]:
     if not threading.main_thread().is_alive():  # Zenoh might not be able to start its thread
         return declare(declaring)
     channel = _RareChannel()
-    # The thread is a daemon, which the end of the program does not wait for, if that of its
-    # declaration is one.
+    return _declare_on_daemon(declaring, channel.handler), channel
+
+
+def declare_callback(declaring: Callable[[Any], T]) -> tuple[T, Channel | CallbackQueue]:
+    """Declare something for which items arrive rarely: no thread waits for them.
+
+    What is said of `declare_rare` applies.
+
+    Args:
+        declaring: Function that declares it with a handler.
+
+    Returns:
+        The object of Zenoh, and the queue of the items; a channel while the program ends.
+    """
+    if not threading.main_thread().is_alive():
+        return declare(declaring)
+    queue = CallbackQueue()
+    OPEN.add(queue)
+    try:
+        return _declare_on_daemon(declaring, queue.handler), queue
+    except BaseException:
+        OPEN.discard(queue)
+        raise
+
+
+def _declare_on_daemon(declaring: Callable[[Any], T], handler: Any) -> T:
+    """Declare something on a thread that is a daemon.
+
+    Then the thread that Zenoh starts is one, too, which the end of the program does not wait for.
+    """
     if threading.current_thread().daemon:
-        return declaring(channel.handler), channel
+        return declaring(handler)
     made: SimpleQueue[tuple[T | None, BaseException | None]] = SimpleQueue()
 
     def run() -> None:
         try:
-            made.put((declaring(channel.handler), None))
+            made.put((declaring(handler), None))
         except BaseException as error:  # noqa: BLE001  # the caller raises it
             made.put((None, error))
 
-    _daemons.submit(run)
+    if not lend_thread(run):
+        run()
     entity, error = made.get()
     if error is not None:
         raise error
-    return entity, channel  # type: ignore[return-value]  # there is one without an error
-
-
-def waits_in_zenoh(channel: Channel) -> bool:
-    """Return whether a thread that receives from a channel waits inside Zenoh.
-
-    One that waits elsewhere has to go on until the channel is closed, also while the program ends:
-    only then has the thread of Zenoh that fills it left Python.
-    """
-    return not isinstance(channel, _RareChannel)
+    return entity  # type: ignore[return-value]  # there is one without an error
 
 
 class _RareChannel:
@@ -139,5 +169,63 @@ class _RareChannel:
         return item
 
 
-_daemons: Worker[Callable[[], object]] = Worker("rosz-declare", threads=8)
-"""Threads to declare something on."""
+class CallbackQueue:
+    """Items that Zenoh adds, and a function that handles all of them on a thread that it borrows.
+
+    The function runs on one thread at a time. Where no thread can be had, it runs on the one that
+    adds the items.
+    """
+
+    def __init__(self) -> None:
+        self._items: deque[Any] = deque()
+        # Has an item while nobody handles the items: to pop it is to take that on.
+        self._unhandled: deque[bool] = deque()
+        self._handle: Callable[[], object] = self._items.clear
+        self._program = current()
+
+    @property
+    def handler(self) -> Any:
+        """A handler to declare something with."""
+        return zenoh.handlers.Callback(self._add, partial(OPEN.discard, self), indirect=True)
+
+    def handle_with(self, handle: Callable[[], object], *, at_once: bool) -> None:
+        """Handle the items from now on.
+
+        Args:
+            handle: Function that takes all items; it is called again when more have come.
+            at_once: Whether it is called before any item has come.
+        """
+        self._handle = handle
+        self._unhandled.append(True)
+        if at_once or self._items:
+            self._wake()
+
+    def take(self) -> Any:
+        """Return the oldest item and remove it; None if there is none."""
+        try:
+            return self._items.popleft()
+        except IndexError:
+            return None
+
+    def _add(self, item: Any) -> None:
+        self._items.append(item)
+        del item
+        self._wake()
+
+    def _wake(self) -> None:
+        if self._begin() and not lend_thread(self._run):
+            self._run()
+
+    def _begin(self) -> bool:
+        try:
+            return self._unhandled.pop()
+        except IndexError:
+            return False
+
+    def _run(self) -> None:
+        with within(self._program):
+            while True:
+                self._handle()
+                self._unhandled.append(True)
+                if not self._items or not self._begin():
+                    return

@@ -13,13 +13,13 @@ import zenoh
 
 from rosz.errors import ClosedError, TransportError
 from rosz.session.at_exit import ENDING, leak_at_exit
-from rosz.session.channels import Channel, waits_in_zenoh
+from rosz.session.channels import CallbackQueue, Channel
 from rosz.session.samples import Sample
 from rosz.worker import Worker
 
 __all__ = (
     "BoundedSubscriber",
-    "CallbackThread",
+    "Callbacks",
     "Declared",
     "PullSubscriber",
     "RawPublisher",
@@ -126,59 +126,93 @@ class Declared:
         self.close()
 
 
-class CallbackThread(Declared):
-    """A declaration with a channel, and a thread that calls back for each item of it.
+class Callbacks(Declared):
+    """A declaration with a function that is called back for each item of it, one at a time.
 
     Args:
         what: The name of the declaration in error texts.
-        declared: The object of Zenoh, and the channel that it was declared with.
-        callback: Function called with each item on the thread; exceptions are logged.
-        begin: Function called once on the thread, before it receives the first item.
-        idle: Function called on the thread whenever there is no item, before it waits for one.
+        declared: The object of Zenoh, and where its items arrive.
+        callback: Function called with each item; exceptions are logged.
+        begin: Function called once, before the first item.
+        idle: Function called whenever there is no item left.
     """
 
     def __init__(
         self,
         what: str,
-        declared: tuple[Any, Channel],
+        declared: tuple[Any, Channel | CallbackQueue],
         callback: Callable[[Any], None],
         begin: Callable[[], None] | None = None,
         idle: Callable[[], None] | None = None,
     ) -> None:
-        entity, channel = declared
+        entity, source = declared
         super().__init__(what, entity)
-        # The thread must not refer to this object, else it would not be undeclared. The items
-        # must not leave this package, not even as arguments: see `rosz.session.at_exit`.
-        recv, try_recv, in_zenoh = channel.recv, channel.try_recv, waits_in_zenoh(channel)
-        item: Any = None
+        # What calls back must not refer to this object, else it would not be undeclared.
+        if isinstance(source, CallbackQueue):
+            delivery = _Delivery(what, source.take, callback, begin, idle)
+            source.handle_with(delivery.deliver_all, at_once=bool(begin or idle))
+            return
+        delivery = _Delivery(what, source.try_recv, callback, begin, idle)
+        recv = source.recv
 
         def receive() -> bool | None:
-            nonlocal begin, item
-            first, begin = begin, None
-            if first is not None:
-                first()
-            if ENDING.is_set() and in_zenoh:
+            if ENDING.is_set():
                 return None
             try:
-                if idle is not None:
-                    item = try_recv()
-                    if item is not None:
-                        return True
-                    idle()
+                delivery.deliver_all()
                 item = recv()
             except zenoh.ZError:  # undeclared, or the session is closed
                 return None
+            delivery.deliver(item)
             return True
 
-        def handle(_: bool) -> None:
-            nonlocal item
-            try:
-                callback(item)
-            except Exception:  # noqa: BLE001  # the callback boundary: the next item may succeed
-                _log.exception("the callback of the %s failed", what)
-            item = None
+        Worker(f"rosz {what}", lambda _: None, receive=receive, logger=_log)
 
-        Worker(f"rosz {what}", handle, receive=receive, logger=_log)
+
+class _Delivery:
+    """Passes items to a callback; the arguments are those of `Callbacks`, but for ``take``.
+
+    Items do not leave this package, not even as arguments: see `rosz.session.at_exit`.
+
+    Args:
+        what: The name of the declaration.
+        take: Function that returns the oldest item; None if there is none.
+        callback: Function called with each item.
+        begin: Function called once, before the first item.
+        idle: Function called whenever there is no item left.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        take: Callable[[], Any],
+        callback: Callable[[Any], None],
+        begin: Callable[[], None] | None,
+        idle: Callable[[], None] | None,
+    ) -> None:
+        self._what = what
+        self._take = take
+        self._callback = callback
+        self._first = begin
+        self._idle = idle
+
+    def deliver(self, item: Any) -> None:
+        """Pass an item to the callback."""
+        try:
+            self._callback(item)
+        except Exception:  # noqa: BLE001  # the callback boundary: the next item may succeed
+            _log.exception("the callback of the %s failed", self._what)
+
+    def deliver_all(self) -> None:
+        """Pass all items that are there."""
+        first, self._first = self._first, None
+        if first is not None:
+            first()
+        while (item := self._take()) is not None:
+            self.deliver(item)
+            del item
+        if self._idle is not None:
+            self._idle()
 
 
 class PullSubscriber(Declared):

@@ -6,7 +6,6 @@ What arrives waits in channels (`rosz.session.channels`), from which threads of 
 from __future__ import annotations
 
 import logging
-import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache, partial
@@ -19,11 +18,11 @@ import zenoh.ext
 from rosz.errors import ClosedError
 from rosz.lifecycle import Closable, Lifecycle
 from rosz.session.at_exit import ENDING, ClosedSession
-from rosz.session.channels import declare, declare_rare, open_channel
+from rosz.session.channels import declare, declare_callback, declare_rare, open_channel
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
     BoundedSubscriber,
-    CallbackThread,
+    Callbacks,
     Declared,
     PullSubscriber,
     RawPublisher,
@@ -52,7 +51,7 @@ from rosz.session.zenoh_workarounds import (
     close_links_at_once,
     remove_abandoned_segments,
 )
-from rosz.worker import start_thread
+from rosz.worker import lend_thread
 
 __all__ = ("Session",)
 
@@ -245,11 +244,11 @@ class Session:
             remote_only: Whether to ignore what this session itself publishes.
             rare: Whether samples arrive rarely, and may wait; waiting for them costs less then.
         """
-        make = declare_rare if rare else declare
+        make = declare_callback if rare else declare
         declared = make(
             lambda handler: self._subscribe(key, handler, history, recover, remote_only)
         )
-        return CallbackThread(f"subscriber '{key}'", declared, lambda raw: callback(Sample(raw)))
+        return Callbacks(f"subscriber '{key}'", declared, lambda raw: callback(Sample(raw)))
 
     def pull_subscriber(
         self,
@@ -322,8 +321,10 @@ class Session:
             complete: Whether the replies are all there are; ROS 2 clients query only such.
         """
         with translate_errors(f"serve '{key}'"):
-            declared = declare_rare(partial(self._raw.declare_queryable, key, complete=complete))
-        return CallbackThread(f"queryable '{key}'", declared, lambda raw: callback(Query(raw)))
+            declared = declare_callback(
+                partial(self._raw.declare_queryable, key, complete=complete)
+            )
+        return Callbacks(f"queryable '{key}'", declared, lambda raw: callback(Query(raw)))
 
     def pull_queryable(
         self, key: str, *, complete: bool = False, remote_only: bool = False, rare: bool = False
@@ -367,7 +368,7 @@ class Session:
             many: Whether hundreds of tokens may come at once; watching costs more then.
         """
         watch = TokenWatch(callback, self._tokens, lambda: self.live_tokens(key, _TOKENS_SECONDS))
-        make = declare if many else declare_rare
+        make = declare if many else declare_callback
         with translate_errors(f"watch tokens '{key}'"):
             liveliness = self._raw.liveliness()
             declared = make(partial(liveliness.declare_subscriber, key, history=True))
@@ -378,7 +379,7 @@ class Session:
                 handler = liveliness.get(key, open_channel(), timeout=_TOKENS_SECONDS)
                 watch.existing = Replies(handler)
         what = f"watch of tokens '{key}'"
-        return CallbackThread(what, declared, watch.deliver, watch.begin, watch.idle)
+        return Callbacks(what, declared, watch.deliver, watch.begin, watch.idle)
 
     def query(
         self,
@@ -466,8 +467,7 @@ class Session:
             finally:
                 on_done()
 
-        name = f"rosz replies '{key}'"
-        if not start_thread(threading.Thread(target=deliver, name=name, daemon=True)):
+        if not lend_thread(deliver):
             deliver()
 
     def live_tokens(self, key: str, timeout: float) -> list[str]:

@@ -50,9 +50,9 @@ import zenoh
 
 from rosz.errors import TransportError
 from rosz.lifecycle import Closable
-from rosz.session.channels import declare_rare
+from rosz.session.channels import declare_callback
 from rosz.session.config import SessionConfig, insert_setting, read_setting
-from rosz.session.declared import CallbackThread
+from rosz.session.declared import Callbacks
 from rosz.session.local_peers import (
     LocalPeers,
     describe_process,
@@ -247,8 +247,8 @@ class _StoppedPeers:
 
 def close_links_at_once(raw: Any) -> Closable:
     """Return a watch that makes a session close its TCP links at once, now and in the future."""
-    declared = declare_rare(partial(raw.info.declare_link_events_listener, history=True))
-    return CallbackThread("watch of links", declared, _set_no_wait)
+    declared = declare_callback(partial(raw.info.declare_link_events_listener, history=True))
+    return Callbacks("watch of links", declared, _set_no_wait)
 
 
 def _set_no_wait(event: Any) -> None:

@@ -111,13 +111,15 @@ def test_closed(talker: Node) -> None:
 
 
 def test_closed_follows_nobody(talker: Node) -> None:
+    interests = talker.context.graph._interests
     publisher = talker.publisher("chatter", String)
+    publisher.on_connection(print)
+    assert [one for one in interests.all() if one.name == "/chatter"]
     publisher.close()
     with pytest.raises(ClosedError, match="cannot follow its subscriptions"):
         publisher.on_connection(print)
-    following = "/MS/*/*/*/$*chatter/"
     eventually(
-        lambda: not [one.name for one in threading.enumerate() if following in one.name],
+        lambda: not [one for one in interests.all() if one.name == "/chatter"],
         "the end of its watch",
     )
 

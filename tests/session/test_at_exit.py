@@ -10,8 +10,8 @@ import pytest
 from network import TIMEOUT, Network
 
 from rosz.session import declared
-from rosz.session.channels import declare_rare
-from rosz.session.declared import CallbackThread
+from rosz.session.channels import declare_callback
+from rosz.session.declared import Callbacks
 
 
 def test_a_thread_that_leaves_late_is_waited_for(network: Network) -> None:
@@ -56,10 +56,10 @@ def test_a_thread_of_zenoh_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> Non
         ending.set()
         received.put(item)
 
-    thread = CallbackThread("test", declare_rare(declare), callback)
+    declaration = Callbacks("test", declare_callback(declare), callback)
     (handler,) = handlers
     for item in (1, 2):
         handler.callback(item)
     assert [received.get(timeout=TIMEOUT) for _ in range(2)] == [1, 2]
     handler.drop()
-    thread.close()
+    declaration.close()

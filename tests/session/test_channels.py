@@ -1,4 +1,4 @@
-"""Channels: a thread that waits for what arrives rarely does not wake meanwhile."""
+"""Channels, and callbacks for what arrives rarely: no thread wakes meanwhile."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ import pytest
 import zenoh
 from network import TIMEOUT, Network, eventually
 
-from rosz.session import Session
-from rosz.session.channels import declare_rare
+from rosz.session import Sample, Session, channels
+from rosz.session.at_exit import OPEN
+from rosz.session.channels import declare_callback, declare_rare
+
+COUNT = 600  # more than Zenoh keeps for a thread of Python
 
 
 def _wakes(thread: threading.Thread) -> int:
@@ -30,15 +33,16 @@ RARE: dict[str, Callable[[Session, Callable[..., None]], Any]] = {
 
 
 @pytest.mark.parametrize("kind", RARE)
-def test_a_thread_that_waits_does_not_wake(network: Network, kind: str) -> None:
+def test_no_thread_wakes_while_nothing_arrives(network: Network, kind: str) -> None:
     session, other = network.session(), network.session()
     before = set(threading.enumerate())
     heard: SimpleQueue[Any] = SimpleQueue()
     declared = RARE[kind](session, lambda *one: heard.put(one))
-    own = {one for one in set(threading.enumerate()) - before if one.name != "rosz-declare"}
-    own = {one for one in own if kind in one.name or "pyo3" in one.name}
+    new = set(threading.enumerate()) - before
+    own = {one for one in new if "pyo3" in one.name}
     assert own
     assert all(one.daemon for one in own)
+    assert {one.name for one in new - own} <= {"rosz-lent"}
     token = other.token("a/b")
 
     def is_heard() -> bool:
@@ -79,3 +83,92 @@ def test_all_threads_that_receive_hear_of_the_end(network: Network) -> None:
     session.close()
     assert [ends.get(timeout=TIMEOUT) for _ in threads] == [None] * 3
     assert queryable.receive() is None
+
+
+def test_callbacks_of_a_declaration_run_one_at_a_time(network: Network) -> None:
+    session, other = network.session(), network.session()
+    heard: list[int] = []
+    inside = threading.Lock()
+    complete = threading.Event()
+
+    def callback(sample: Sample) -> None:
+        assert inside.acquire(blocking=False)
+        heard.append(int(sample.payload))
+        threading.Event().wait(0.0005)  # others are waiting for the processor
+        inside.release()
+        if len(heard) == COUNT:
+            complete.set()
+
+    subscriber = session.subscriber("a/b", callback, rare=True)
+    publisher = other.publisher("a/b", block=True)
+    eventually(lambda: publisher.matched, "the subscriber")
+    for number in range(COUNT):
+        publisher.put(b"%d" % number)
+    assert complete.wait(TIMEOUT)
+    assert heard == list(range(COUNT))
+    subscriber.close()
+
+
+def test_a_callback_may_wait_for_one_of_another_declaration(network: Network) -> None:
+    session, other = network.session(), network.session()
+    reached, done = threading.Event(), threading.Event()
+    second = session.subscriber("a/second", lambda _: reached.set(), rare=True)
+
+    def callback(_: Sample) -> None:
+        other.put("a/second", b"")
+        if reached.wait(TIMEOUT):
+            done.set()
+
+    first = session.subscriber("a/first", callback, rare=True)
+
+    def is_done() -> bool:
+        other.put("a/first", b"")
+        return done.wait(0.1)
+
+    eventually(is_done)
+    first.close()
+    second.close()
+
+
+@pytest.mark.usefixtures("no_threads")
+@pytest.mark.parametrize("kind", RARE)
+def test_callbacks_where_no_thread_is_left(network: Network, kind: str) -> None:
+    """They run on the thread that Zenoh has started."""
+    session, other = network.session(), network.session()
+    heard: SimpleQueue[str] = SimpleQueue()
+    declared = RARE[kind](session, lambda *_: heard.put(threading.current_thread().name))
+    token = other.token("a/b")
+
+    def is_heard() -> bool:
+        other.put("a/b", b"")
+        other.get("a/b", timeout=0.1)
+        return not heard.empty()
+
+    eventually(is_heard)
+    assert "pyo3" in heard.get()
+    declared.close()
+    token.close()
+
+
+@pytest.fixture
+def no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lend no thread."""
+    monkeypatch.setattr(channels, "lend_thread", lambda _: False)
+
+
+def test_a_failed_callback_declaration_is_not_waited_for(network: Network) -> None:
+    session = network.session()
+    before = set(OPEN)
+    with pytest.raises(zenoh.ZError):
+        declare_callback(lambda handler: session._raw.declare_subscriber("a//b", handler))
+    assert set(OPEN) <= before
+
+
+def test_what_is_closed_is_not_waited_for(network: Network) -> None:
+    before = set(OPEN)
+    session = network.session()
+    subscriber = session.subscriber("a/b", lambda _: None, rare=True)
+    assert OPEN - before
+    session.close()
+    subscriber.close()
+    eventually(lambda: not OPEN - before, "the end of the threads of Zenoh")

@@ -39,6 +39,7 @@ from rosz.params.wire import (
 )
 from rosz.params.writes import Change, Write, put
 from rosz.session import Query, Reply, Stamp
+from rosz.worker import lend_thread
 
 __all__ = ("ClientServer", "ParameterKeys", "is_key_in")
 
@@ -59,7 +60,7 @@ _STORAGES_ONLY: Final = "_by=replica"
 
 
 class ClientServer:
-    """Reads on the replica's worker, and writes on a thread for each write, for clients.
+    """Reads on the replica's worker, and writes on a thread that is lent for each, for clients.
 
     Args:
         core: Core of the replica.
@@ -118,12 +119,9 @@ class ClientServer:
         if not self._slots.acquire(blocking=False):
             _reply(query, ClientReply("joining"))
             return
-        threading.Thread(
-            target=self._finish_write,
-            args=(query, request, reach),
-            name="rosz-params-ask",
-            daemon=True,
-        ).start()
+        if not lend_thread(partial(self._finish_write, query, request, reach)):
+            self._slots.release()
+            _reply(query, ClientReply("joining"))
 
     def _finish_write(self, query: Query, request: ClientRequest, reach: Path) -> None:
         try:
