@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,6 +14,13 @@ from .robot import LONG, SPACE, THEMES, World, eventually, open_browser, set_scr
 pytestmark = [pytest.mark.system]
 
 _SHOW = "show=grid,tf,robot,/map,/cloud,/scan;color=%23ff3030,/markers,/path;color=%231f9d61"
+_PICTURE = (
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGNIMPgAAAJ0AYFMZMHJAAAAAElFTkSuQmCC"
+)
+"""A PNG of one pixel."""
+_PAINTED = """<robot name="p"><link name="map"><visual><geometry><box size="2 2 2"/></geometry>
+<material name="m"><texture filename="package://painted/skin.png"/></material></visual></link>
+</robot>"""
 _DRAWN = """
 const root = Object.entries(window).find(([name]) => name.startsWith('scene_c'))?.[1];
 const found = {};
@@ -33,7 +41,12 @@ def world() -> Iterator[World]:
         with open_browser() as browser:
             robot = network.program(SPACE)
             robot.wait_for("ready", LONG)
-            server = network.run("-m", "rosz", "web", "--port", "0")
+            package = network.folder / "painted"
+            package.mkdir()
+            (package / "package.xml").write_text("<package><name>painted</name></package>")
+            (package / "skin.png").write_bytes(base64.b64decode(_PICTURE))
+            paths = {"ROSZ_PACKAGE_PATH": str(network.folder)}
+            server = network.run("-m", "rosz", "web", "--port", "0", **paths)
             yield World(network, robot, server, browser)
     finally:
         network.close()
@@ -141,4 +154,20 @@ return [first, color.getHexString()];
     eventually(lambda: world.ask(colors) == ["1b202a", "1b202a"], "a dark view")
     world.ask("document.body.classList.remove('body--dark')")
     eventually(lambda: world.ask(colors) == ["1b202a", "e9edf4"], "a light view")
+    assert world.messages() == []
+
+
+def test_a_texture_is_on_a_robot(world: World) -> None:
+    world.network.node("painter").params.set("/painted", _PAINTED)
+    world.open("/3d?frame=map&show=robot:/painted")
+    world.should_see("1 links")
+    size = """
+const root = Object.entries(window).find(([name]) => name.startsWith('scene_c'))[1];
+const found = [];
+root.traverse((one) => {
+  if (one.isInstancedMesh) found.push(one.material.map?.image?.width ?? 0);
+});
+return found;
+"""
+    eventually(lambda: world.ask(size) == [1], "the texture of the box")
     assert world.messages() == []

@@ -7,12 +7,37 @@ const shapes = {
   cylinder: new THREE.CylinderGeometry(0.5, 0.5, 1, 24).rotateX(Math.PI / 2),
   cone: new THREE.ConeGeometry(0.5, 1, 24).rotateX(Math.PI / 2),
 };
-const loaders = { stl: new STLLoader(), glb: new GLTFLoader() };
+const loaders = { stl: new STLLoader(), glb: new GLTFLoader(), picture: new THREE.TextureLoader() };
 const loaded = new Map();
 
 function load(url, form) {
-  if (!loaded.has(url)) loaded.set(url, loaders[form].loadAsync(url));
-  return loaded.get(url);
+  const key = `${form} ${url}`;
+  if (!loaded.has(key)) loaded.set(key, loaders[form].loadAsync(window.path_prefix + url));
+  return loaded.get(key);
+}
+
+// The rows of a texture begin below for the shapes here, and above for those of glTF.
+async function loadTexture(url, upright) {
+  const texture = (await load(url, "picture")).clone();
+  texture.colorSpace = THREE.SRGBColorSpace;
+  texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
+  texture.flipY = upright;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+function textureOf(url, upright) {
+  const key = `${upright} ${url}`;
+  if (!loaded.has(key)) loaded.set(key, loadTexture(url, upright));
+  return loaded.get(key);
+}
+
+function show(material, url, upright) {
+  if (!url) return;
+  textureOf(url, upright).then((texture) => {
+    material.map = texture;
+    material.needsUpdate = true;
+  });
 }
 
 export default class Drawing {
@@ -54,11 +79,11 @@ export default class Drawing {
     const added = parts.map((part) => this[part.kind](part, take));
     for (const one of old) {
       if (added.includes(one)) continue;
-      if (one.own) one.geometry.dispose();
-      if (one.material) {
+      if (one.own) {
+        one.geometry.dispose();
         one.material.map?.dispose();
-        one.material.dispose();
       }
+      one.material?.dispose();
       if (one.isInstancedMesh) one.dispose();
       this.mesh.remove(one);
     }
@@ -96,6 +121,7 @@ export default class Drawing {
   shapes(part, take) {
     const clear = part.opacity < 1;
     const material = new THREE.MeshLambertMaterial({ transparent: clear, opacity: part.opacity, depthWrite: !clear });
+    show(material, part.texture, true);
     const found = new THREE.InstancedMesh(shapes[part.shape], material, part.count);
     found.instanceMatrix = new THREE.InstancedBufferAttribute(take(Float32Array, 16 * part.count), 16);
     const paint = take(Uint8Array, 4 * part.count);
@@ -141,22 +167,29 @@ export default class Drawing {
     load(part.url, part.form).then((model) => {
       const object = part.form === "stl" ? new THREE.Mesh(model) : model.scene.clone();
       const color = part.color ?? (part.form === "stl" ? [200, 200, 200, 255] : null);
-      if (color) this.paint(object, color);
+      object.traverse((one) => {
+        if (one.isMesh) one.material = color ? this.painted(color, part.texture) : this.plain(one.material);
+      });
       found.add(object);
     });
     return found;
   }
 
-  paint(object, color) {
-    object.traverse((one) => {
-      if (!one.isMesh) return;
-      one.material = new THREE.MeshLambertMaterial({
-        color: new THREE.Color(color[0] / 255, color[1] / 255, color[2] / 255).convertSRGBToLinear(),
-        opacity: color[3] / 255,
-        transparent: color[3] < 255,
-        side: THREE.DoubleSide,
-      });
+  painted(color, texture) {
+    const material = new THREE.MeshLambertMaterial({
+      color: new THREE.Color(color[0] / 255, color[1] / 255, color[2] / 255).convertSRGBToLinear(),
+      opacity: color[3] / 255,
+      transparent: color[3] < 255,
+      side: THREE.DoubleSide,
     });
+    show(material, texture, false);
+    return material;
+  }
+
+  // Metal is black where there is nothing to reflect.
+  plain({ color, map, opacity, transparent, alphaTest, vertexColors }) {
+    const settings = { map, opacity, transparent, alphaTest, vertexColors, side: THREE.DoubleSide };
+    return new THREE.MeshLambertMaterial({ ...settings, color: color ?? 0xffffff });
   }
 
   image(part, take) {

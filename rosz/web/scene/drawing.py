@@ -79,13 +79,14 @@ class Drawing:
         )
         self._data += [rows.tobytes(), paint.tobytes()]
 
-    def shapes(self, shape: Shape, matrices: Array, colors: Array) -> None:
+    def shapes(self, shape: Shape, matrices: Array, colors: Array, texture: str = "") -> None:
         """Draw shapes of size 1 around the origin; cylinders and cones are along z.
 
         Args:
             shape: The shape.
             matrices: A matrix of 4 x 4 numbers for each, with its pose and size.
             colors: Their colors.
+            texture: Where the browser finds a picture for their surface; empty for none.
         """
         rows = np.asarray(matrices, dtype="<f4").reshape(-1, 4, 4)[:_MOST_SHAPES]
         if not len(rows):
@@ -95,7 +96,7 @@ class Drawing:
             chosen = paint[:, 3] == opacity
             columns = np.ascontiguousarray(rows[chosen].transpose(0, 2, 1))
             head = {"kind": "shapes", "shape": shape, "opacity": int(opacity) / _OPAQUE}
-            self._header.append({**head, "count": len(columns)})
+            self._header.append({**head, "count": len(columns), "texture": texture})
             self._data += [columns.tobytes(), np.ascontiguousarray(paint[chosen]).tobytes()]
 
     def text(
@@ -114,7 +115,14 @@ class Drawing:
             {"kind": "text", "text": text, "at": at, "color": color, "height": height}
         )
 
-    def mesh(self, address: str, form: str, matrix: Array, color: Array | None = None) -> None:
+    def mesh(
+        self,
+        address: str,
+        form: str,
+        matrix: Array,
+        color: Array | None = None,
+        texture: str = "",
+    ) -> None:
         """Draw a mesh.
 
         Args:
@@ -122,12 +130,12 @@ class Drawing:
             form: ``stl`` or ``glb``.
             matrix: Its pose and scale.
             color: Its color; None for its own.
+            texture: Where the browser finds a picture for its surface; empty for its own.
         """
         columns = [float(value) for value in np.asarray(matrix).T.reshape(-1)]
         paint = None if color is None else [int(value) for value in color]
-        self._header.append(
-            {"kind": "model", "url": address, "form": form, "matrix": columns, "color": paint}
-        )
+        head = {"kind": "model", "url": address, "form": form, "texture": texture}
+        self._header.append({**head, "matrix": columns, "color": paint})
 
     def image(self, cells: Array, matrix: Array, palette: Array) -> None:
         """Draw cells on the plane z = 0, from its origin to (1, 1) of a matrix.

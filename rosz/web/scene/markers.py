@@ -171,9 +171,10 @@ class MarkerDisplay:
             if one.pose is None:
                 continue
             try:
-                draw_marker(one.marker, one.pose, self._meshes, drawing)
+                found = draw_marker(one.marker, one.pose, self._meshes, drawing)
             except (RoszError, ValueError) as error:
-                faults.append(f"marker {one.marker.ns}/{one.marker.id}: {error}")
+                found = (str(error),)
+            faults += [f"marker {one.marker.ns}/{one.marker.id}: {text}" for text in found]
         self.status = f"{len(placed)} markers, {namespaces} namespaces"
         if faults:
             more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
@@ -187,8 +188,8 @@ class MarkerDisplay:
             subscription.close()
 
 
-def draw_marker(marker: Any, frame: Pose, meshes: Meshes, drawing: Drawing) -> None:
-    """Draw a marker.
+def draw_marker(marker: Any, frame: Pose, meshes: Meshes, drawing: Drawing) -> tuple[str, ...]:
+    """Draw a marker, and return why files are not shown that its mesh refers to.
 
     Args:
         marker: The marker.
@@ -207,9 +208,9 @@ def draw_marker(marker: Any, frame: Pose, meshes: Meshes, drawing: Drawing) -> N
         raise ValueError(f"it has {len(marker.points)} points; expected {_MOST_POINTS} at most")
     pose = compose(frame, pose_from(marker.pose))
     if draw is None:
-        _draw_mesh(marker, pose, meshes, drawing)
-    else:
-        draw(marker, pose, drawing)
+        return _draw_mesh(marker, pose, meshes, drawing)
+    draw(marker, pose, drawing)
+    return ()
 
 
 def _color(color: Any) -> Array:
@@ -342,10 +343,12 @@ def _draw_text(marker: Any, pose: Pose, drawing: Drawing) -> None:
     drawing.text(marker.text, pose.translation, css, marker.scale.z or 0.1)
 
 
-def _draw_mesh(marker: Any, pose: Pose, meshes: Meshes, drawing: Drawing) -> None:
+def _draw_mesh(marker: Any, pose: Pose, meshes: Meshes, drawing: Drawing) -> tuple[str, ...]:
+    """Draw a mesh, and return why files are not shown that it refers to."""
     mesh = meshes.find(marker.mesh_resource)
     color = None if marker.mesh_use_embedded_materials and mesh.colored else _color(marker.color)
     drawing.mesh(mesh.address, mesh.form, _sized(pose, marker.scale), color)
+    return () if color is not None else mesh.missing
 
 
 def _draw_triangles(marker: Any, pose: Pose, drawing: Drawing) -> None:

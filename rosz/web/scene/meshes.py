@@ -1,14 +1,17 @@
 """Meshes of robots and markers: files of packages, in a form that browsers read.
 
-STL and GLB go to the browser as they are; OBJ and Collada (DAE) become GLB, by ``trimesh``. A file
-comes from the folder of a package, and so does what it refers to.
+STL and GLB go to the browser as they are; OBJ, Collada (DAE), glTF and a GLB that refers to other
+files become GLB, by ``trimesh``. A file comes from the folder of a package, and so does what it
+refers to, such as textures.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import posixpath
 import re
+import struct
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -17,14 +20,21 @@ from urllib.parse import unquote, urlsplit
 
 import msgspec
 
-from rosz.bridges.assets import SHOWN, Assets
+from rosz.bridges.assets import Assets
 from rosz.environment import Environment, package_index
 from rosz.errors import RoszError, UsageError
+from rosz.web.scene.drawing import Array
+from rosz.web.scene.textures import read_texture
 
-__all__ = ("Mesh", "Meshes")
+__all__ = ("Mesh", "Meshes", "Texture")
 
 _AS_THEY_ARE = {".stl": "stl", ".glb": "glb"}
-_CONVERTED = (".dae", ".obj")
+_CONVERTED = (".dae", ".gltf", ".obj")
+_PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".tga", ".tif", ".tiff", ".webp")
+_NO_PICTURES = (".bin", ".mtl")
+_ENDINGS = "|".join(map(re.escape, (*_AS_THEY_ARE, *_CONVERTED, *_PICTURES, *_NO_PICTURES)))
+_FILES = re.compile(f"package://.+(?:{_ENDINGS})", re.IGNORECASE)
+_GLB_HEADER = struct.Struct("<4sIII4s")
 _MEDIA = {"stl": "model/stl", "glb": "model/gltf-binary"}
 _UNIT = re.compile(rb"<unit\b[^>]*\bmeter=[\"']([^\"']*)")
 _LIBRARY = "needs libraries: pip install 'rosz[web]'"
@@ -38,12 +48,28 @@ class Mesh(msgspec.Struct, frozen=True):
     Attributes:
         address: Where.
         form: ``stl`` or ``glb``.
-        colored: Whether it has colors of its own.
+        colored: Whether it has materials of its own.
+        mapped: Whether it has texture coordinates.
+        missing: Why files that it refers to are not shown.
     """
 
     address: str
     form: str
     colored: bool
+    mapped: bool
+    missing: tuple[str, ...]
+
+
+class Texture(msgspec.Struct, frozen=True):
+    """A texture that browsers can fetch.
+
+    Attributes:
+        address: Where.
+        color: Color of its first pixel, which a mesh without texture coordinates gets, as in rviz.
+    """
+
+    address: str
+    color: Array
 
 
 class Meshes:
@@ -56,10 +82,11 @@ class Meshes:
 
     def __init__(self, environment: Environment, add: Publish) -> None:
         self._environment = environment
-        self._assets = Assets(environment, SHOWN)
+        self._assets = Assets(environment, (_FILES,))
         self._add = add
         self._lock = threading.Lock()
         self._found: dict[str, Mesh | str] = {}
+        self._textures: dict[str, Texture | str] = {}
 
     def find(self, uri: str) -> Mesh:
         """Return a mesh.
@@ -82,6 +109,28 @@ class Meshes:
             raise UsageError(found)
         return found
 
+    def texture(self, uri: str) -> Texture:
+        """Return a texture.
+
+        Args:
+            uri: ``package://PACKAGE/FILE``, or ``file://`` and the path of a file in a package.
+
+        Raises:
+            UsageError: It cannot be shown; the text says why.
+        """
+        with self._lock:
+            found = self._textures.get(uri)
+            if found is None:
+                try:
+                    data, media, color = read_texture(uri, self._assets.read(self._in_package(uri)))
+                    found = Texture(self._add(lambda: (data, media)), color)
+                except RoszError as error:
+                    found = str(error)
+                self._textures[uri] = found
+        if isinstance(found, str):
+            raise UsageError(found)
+        return found
+
     def _open(self, uri: str) -> Mesh:
         ending = posixpath.splitext(urlsplit(uri).path)[1].lower()
         form = _AS_THEY_ARE.get(ending, "glb")
@@ -90,10 +139,15 @@ class Meshes:
             raise UsageError(f"'{uri}' cannot be shown; expected one of {known}")
         inside = self._in_package(uri)
         data = self._assets.read(inside)
-        if ending in _CONVERTED:
-            data = _converted(inside, data, ending[1:], self._assets)
+        colored = _has_materials(ending, data)
+        missing: tuple[str, ...] = ()
+        if ending in _CONVERTED or (ending == ".glb" and _refers_elsewhere(data)):
+            resolver = _Resolver(inside, self._assets, self._in_package)
+            data = _converted(inside, data, ending[1:], resolver)
+            missing = tuple(resolver.missing.values())
         address = self._add(lambda: (data, _MEDIA[form]))
-        return Mesh(address, form, form == "glb")
+        mapped = form == "glb" and b'"TEXCOORD_0"' in data
+        return Mesh(address, form, colored, mapped, missing)
 
     def _in_package(self, uri: str) -> str:
         """Return a URI of a package, also for the path of a file in one."""
@@ -113,11 +167,17 @@ class _Resolver:
     Args:
         uri: URI of the mesh.
         assets: The files of packages.
+        in_package: Function that returns a URI of a package for one of a file.
+
+    Attributes:
+        missing: Why files cannot be read, by their names.
     """
 
-    def __init__(self, uri: str, assets: Assets) -> None:
+    def __init__(self, uri: str, assets: Assets, in_package: Callable[[str], str]) -> None:
         self._folder = uri.rpartition("/")[0]
         self._assets = assets
+        self._in_package = in_package
+        self.missing: dict[str, str] = {}
 
     def get(self, name: str) -> bytes:
         """Return a file, as ``trimesh`` asks for it.
@@ -125,17 +185,54 @@ class _Resolver:
         Raises:
             OSError: It cannot be read; ``trimesh`` goes on without it.
         """
-        scheme, _, path = f"{self._folder}/{name}".partition("://")
+        path = name.strip().replace("\\", "/")
+        uri = path if "://" in path else f"{self._folder}/{path}"
         try:
-            return self._assets.read(f"{scheme}://{posixpath.normpath(path)}")
+            scheme, _, rest = self._in_package(uri).partition("://")
+            uri = f"{scheme}://{posixpath.normpath(rest)}"
+            if uri.lower().endswith(_NO_PICTURES):
+                return self._assets.read(uri)
+            return read_texture(uri, _read_picture(self._assets, uri))[0]
         except RoszError as error:
+            self.missing[name] = f"without '{name}': {error}"
             raise FileNotFoundError(str(error)) from error
 
     def __getitem__(self, name: str) -> bytes:
         return self.get(name)
 
 
-def _converted(uri: str, data: bytes, kind: str, assets: Assets) -> bytes:
+def _read_picture(assets: Assets, uri: str) -> bytes:
+    """Return a picture of a package.
+
+    Raises:
+        UsageError: It has another ending than pictures have, or it cannot be read.
+        RoszError: The package or the file is not found, or the path leads out of the package.
+    """
+    if not uri.lower().endswith(_PICTURES):
+        raise UsageError(f"'{uri}' cannot be shown; expected one of {', '.join(_PICTURES)}")
+    return assets.read(uri)
+
+
+def _has_materials(ending: str, data: bytes) -> bool:
+    """Return whether a mesh has materials of its own."""
+    sign = {".dae": b"<instance_material", ".obj": b"usemtl", ".stl": b""}.get(ending, b"material")
+    return bool(sign) and sign in data
+
+
+def _refers_elsewhere(glb: bytes) -> bool:
+    """Return whether a GLB refers to other files."""
+    try:
+        *_, length, kind = _GLB_HEADER.unpack_from(glb)
+        tree = json.loads(glb[_GLB_HEADER.size : _GLB_HEADER.size + length])
+    except (struct.error, ValueError):
+        return False
+    if kind != b"JSON" or not isinstance(tree, dict):
+        return False
+    parts = [*tree.get("images", ()), *tree.get("buffers", ())]
+    return any(not one.get("uri", "data:").startswith("data:") for one in parts)
+
+
+def _converted(uri: str, data: bytes, kind: str, resolver: Any) -> bytes:
     """Return a mesh as GLB.
 
     Raises:
@@ -143,10 +240,10 @@ def _converted(uri: str, data: bytes, kind: str, assets: Assets) -> bytes:
     """
     try:
         import collada  # noqa: F401  # trimesh needs it for DAE, and says so late
+        import PIL  # noqa: F401  # trimesh goes on without textures where it is missing
         import trimesh
     except ImportError as error:
         raise UsageError(f"'{uri}' {_LIBRARY}") from error
-    resolver: Any = _Resolver(uri, assets)
     try:
         scene: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=resolver)
         factor = _metres(data) if kind == "dae" else 1.0

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ("RobotDisplay", "Visual", "draw_visual", "read_visuals")
 
-_GRAY = color_bytes("#c4c9d4")
+_GRAY, _WHITE = color_bytes("#c4c9d4"), color_bytes("#ffffff")
 _SOME = 3
 
 
@@ -35,7 +35,7 @@ class Visual(NamedTuple):
         shape: ``cube``, ``sphere``, ``cylinder``, or a URI of a mesh.
         size: Its size in metres, or the scale of the mesh.
         color: Its color; None for that of the mesh.
-        texture: File of the texture that its material has; empty for none.
+        texture: URI of the texture that its material has; empty for none.
     """
 
     link: str
@@ -137,8 +137,8 @@ def _color_of(material: ET.Element | None, materials: dict[str, ET.Element]) -> 
     return found
 
 
-def draw_visual(visual: Visual, link: Pose, meshes: Meshes, drawing: Drawing) -> None:
-    """Draw a part of a link.
+def draw_visual(visual: Visual, link: Pose, meshes: Meshes, drawing: Drawing) -> list[str]:
+    """Draw a part of a link, and return why files are not shown that it refers to.
 
     Args:
         visual: The part.
@@ -150,12 +150,26 @@ def draw_visual(visual: Visual, link: Pose, meshes: Meshes, drawing: Drawing) ->
         UsageError: The mesh cannot be shown.
     """
     matrix = placed(compose(link, visual.origin), *visual.size)
-    color = visual.color
+    color, texture, faults = visual.color, None, []
+    if visual.texture:
+        try:
+            texture = meshes.texture(visual.texture)
+        except UsageError as error:
+            faults.append(f"without its texture: {error}")
+        else:
+            color = _WHITE
+    address = "" if texture is None else texture.address
     if visual.shape in {"cube", "sphere", "cylinder"}:
-        drawing.shapes(visual.shape, matrix, _GRAY if color is None else color)  # type: ignore[arg-type]
-        return
+        paint = _GRAY if color is None else color
+        drawing.shapes(visual.shape, matrix, paint, address)  # type: ignore[arg-type]
+        return faults
     mesh = meshes.find(visual.shape)
-    drawing.mesh(mesh.address, mesh.form, matrix, None if mesh.colored else color)
+    if mesh.colored:
+        color, address = None, ""
+    elif texture is not None and not mesh.mapped:
+        color, address = texture.color, ""
+    drawing.mesh(mesh.address, mesh.form, matrix, color, address)
+    return [*faults, *mesh.missing]
 
 
 class RobotDisplay:
@@ -228,23 +242,22 @@ class RobotDisplay:
         faults: dict[str, None] = {}
         before = f"{self.look.prefix}/" if self.look.prefix else ""
         for visual in visuals:
-            if visual.texture:
-                faults[f"link '{visual.link}': the texture '{visual.texture}' is not shown"] = None
             try:
                 pose = self._frames.find(fixed, f"{before}{visual.link}")
             except TransformError as error:
                 lost.setdefault(visual.link, str(error).strip())
                 continue
             try:
-                draw_visual(visual, pose, self._meshes, drawing)
+                found = draw_visual(visual, pose, self._meshes, drawing)
             except RoszError as error:
-                faults[f"link '{visual.link}': {error}"] = None
-        found = list(faults)
+                found = [str(error)]
+            faults |= dict.fromkeys(f"link '{visual.link}': {one}" for one in found)
+        listed = list(faults)
         if lost:
             links = ", ".join(list(lost)[:_SOME]) + " …" * (len(lost) > _SOME)
             why = next(iter(lost.values()))
-            found.insert(0, f"no transform to '{fixed}' of {len(lost)} links ({links}): {why}")
-        return found
+            listed.insert(0, f"no transform to '{fixed}' of {len(lost)} links ({links}): {why}")
+        return listed
 
     def close(self) -> None:
         """Watch the parameter no longer."""
