@@ -122,7 +122,8 @@ class Meshes:
             found = self._textures.get(uri)
             if found is None:
                 try:
-                    data, media, color = read_texture(uri, self._assets.read(self._in_package(uri)))
+                    data = _read_picture(self._assets, self._in_package(uri))
+                    data, media, color = read_texture(uri, data)
                     found = Texture(self._add(lambda: (data, media)), color)
                 except RoszError as error:
                     found = str(error)
