@@ -131,6 +131,7 @@ class Decoder:
         self._type_hash = type_hash
         self._decode = decode
         self._message_type = message_type
+        self._taken = None if decode is None else message_type
         self._has_header = message_type is not None and bool(message_type._has_header)
         self._log = log
         self._report_lost = report_lost
@@ -152,19 +153,18 @@ class Decoder:
 
     def decode(self, sample: AnySample) -> Received | None:
         """Decode one sample; ``None`` if it is damaged or a repetition."""
+        if isinstance(sample, LocalSample) and type(sample.message) is self._taken:
+            return self._take(sample)
         sequence, source_time, gid, lost = 0, 0, b"", 0
         try:
-            local = sample if isinstance(sample, LocalSample) else None
-            if local is not None:
-                sequence, source_time, gid = local.sequence, local.stamp, local.gid
+            if isinstance(sample, LocalSample):
+                sequence, source_time, gid = sample.sequence, sample.stamp, sample.gid
             elif (attachment := sample.attachment) is not None:
                 sequence, source_time, gid = read_attachment(attachment)
             if sequence > 0:
                 lost = self._advance(gid, sequence, replayed=isinstance(sample, Reply))
                 if lost < 0:
                     return None
-            if local is not None and self._takes(local.message):
-                return local.message, self._info(sequence, source_time, gid, lost, local.size)
             payload = sample.payload
             message: Any = payload if self._decode is None else self._decode(payload)
         except DecodeError as error:
@@ -174,6 +174,20 @@ class Decoder:
             # ROS 1 code reads the sequence number from there.
             message.header.seq = sequence
         return message, self._info(sequence, source_time, gid, lost, len(payload))
+
+    def _take(self, sample: LocalSample) -> Received | None:
+        """Return a message of this process itself; ``None`` if it is a repetition."""
+        gid, sequence, lost = sample.gid, sample.sequence, 0
+        publisher = self._publishers.get(gid)
+        if publisher and sequence == publisher.last + 1 and not publisher.replays:
+            publisher.last = sequence  # as nearly always, and without a further call
+        else:
+            lost = self._advance(gid, sequence, replayed=False)
+            if lost < 0:
+                return None
+        if not self._with_info:
+            return sample.message, None
+        return sample.message, self._info(sequence, sample.stamp, gid, lost, sample.size)
 
     def _advance(self, gid: bytes, sequence: int, *, replayed: bool) -> int:
         """Return the number of samples missing before one; -1 if it is a repetition."""
@@ -193,10 +207,6 @@ class Decoder:
         if lost:
             self._report_lost(lost)
         return lost
-
-    def _takes(self, message: Any) -> bool:
-        """Return whether a message of another node of this process is passed on as it is."""
-        return self._decode is not None and type(message) is self._message_type
 
     def _info(  # called for each message
         self, sequence: int, source_time: int, gid: bytes, lost: int, size: int

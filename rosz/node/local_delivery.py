@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+
+import msgspec
 
 from rosz.lifecycle import Registration
 from rosz.wire import Token
@@ -19,51 +21,38 @@ from rosz.wire import Token
 __all__ = ("LocalDelivery", "LocalReceiver", "LocalSample")
 
 
-class LocalSample:
+class LocalSample(msgspec.Struct, gc=False):
     """A message on its way to subscriptions of the same process.
 
-    Args:
+    Attributes:
         key: Key expression of the publisher's data.
         sequence: Sequence number.
         stamp: Time of publication in nanoseconds since the Unix epoch.
         gid: 16 bytes that identify the publisher.
         message: The message itself; None if each subscription is to decode its own.
-        payload: Encoded message, or a function that encodes it.
-
-    Attributes:
+        encoded: Encoded message, or a function that encodes it.
         attachment: None, as the number and the rest are attributes here.
     """
 
-    __slots__ = ("_payload", "gid", "key", "message", "sequence", "stamp")
+    attachment: ClassVar[None] = None
 
-    attachment: None = None
-
-    def __init__(  # one is made for each message
-        self,
-        key: str,
-        sequence: int,
-        stamp: int,
-        gid: bytes,
-        message: Any,
-        payload: bytes | Callable[[Any], bytes],
-    ) -> None:
-        self.key: str = key
-        self.sequence: int = sequence
-        self.stamp: int = stamp
-        self.gid: bytes = gid
-        self.message: Any = message
-        self._payload = payload
+    key: str
+    sequence: int
+    stamp: int
+    gid: bytes
+    message: Any
+    encoded: bytes | Callable[[Any], bytes]
 
     @property
     def payload(self) -> bytes:
         """The encoded message."""
-        payload = self._payload
-        return payload if isinstance(payload, bytes) else payload(self.message)
+        encoded = self.encoded
+        return encoded if isinstance(encoded, bytes) else encoded(self.message)
 
     @property
     def size(self) -> int:
         """Length of the encoded message in bytes; 0 if it is not encoded."""
-        return len(self._payload) if isinstance(self._payload, bytes) else 0
+        return len(self.encoded) if isinstance(self.encoded, bytes) else 0
 
 
 class LocalReceiver(NamedTuple):

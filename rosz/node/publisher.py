@@ -118,6 +118,7 @@ class Publisher(Entity, Generic[M]):
         self._receivers: tuple[LocalReceiver, ...] = ()
         self._receivers_version = -1
         self._copies = copies
+        self._latched = qos.latched
         self._has_header = bool(message_type._has_header)
         self._raw = node.context.session.publisher(
             self.key,
@@ -203,8 +204,8 @@ class Publisher(Entity, Generic[M]):
             if self._lifecycle.closing:
                 self.check_open("publish")
             receivers = self._receivers
-            sent = self._held is not None or self.qos.latched or self._fetching
-            sent = sent or self._raw.matched
+            # The links are up where small samples may be put as they are.
+            sent = self._small < 0 or self._latched or self._raw.matched
             if payload is None and (sent or self._copies):
                 payload = self._encode(message)
             if sent and payload is not None:

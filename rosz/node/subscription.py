@@ -217,9 +217,15 @@ class Subscription(Entity, Generic[M]):
             self._queue.put((sample, None))
 
     def _dispatch_queued(self, item: _Item) -> None:
-        if isinstance(item[0], Reply) and item[1] is not None:
-            self._await_live(item[0], item[1])
-        self._dispatch(*item)
+        """Dispatch an item, and all that have come until there is none."""
+        items, dispatch = self._queue.items, self._dispatch
+        with suppress(IndexError):  # there is none
+            while True:
+                sample, decoder = item
+                if decoder is not None and isinstance(sample, Reply):
+                    self._await_live(sample, decoder)
+                dispatch(sample, decoder)
+                item = items.popleft()
 
     def _await_live(self, replayed: Reply, decoder: Decoder) -> None:
         """Wait for the live samples up to a replayed one that was published since the start."""
@@ -244,7 +250,8 @@ class Subscription(Entity, Generic[M]):
             return
         try:
             with self._turn:
-                received = self._decode(sample, decoder)
+                decoder = decoder or self._decoder or self._decoder_of(sample)
+                received = None if decoder is None else decoder.decode(sample)
                 if received is None:
                     return
                 if self._with_info:

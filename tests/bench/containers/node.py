@@ -60,7 +60,8 @@ def main(role: str, library: str, kind_name: str) -> None:
     def count(_: object) -> None:
         nonlocal heard
         heard += 1
-        came.set()
+        if heard == 1:
+            came.set()
 
     subscription = subscribe(count)
     came.wait(30)
