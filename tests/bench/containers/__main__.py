@@ -64,7 +64,7 @@ def rate(library: str, kind: str, variables: dict[str, str], *, together: bool) 
 
 def main() -> None:
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else _ROUNDS
-    for kind in ("Twist", "Image"):
+    for kind in ("Twist", "LaserScan", "Image"):
         found: dict[str, list[float]] = {name: [] for name in _SYSTEMS}
         for _ in range(rounds):
             for name, (library, together) in _SYSTEMS.items():
@@ -79,7 +79,7 @@ def main() -> None:
         base = {one: statistics.median(figures) for one, figures in found.items()}
         for name, median in base.items():
             other = base["two, rospy programs" if "rospy" in name else "two processes"]
-            print(f"{kind:6} {name:20} {median:10.0f} per s  {median / other:6.1f} x")
+            print(f"{kind:10} {name:20} {median:10.0f} per s  {median / other:6.1f} x")
 
 
 if __name__ == "__main__":

@@ -15,11 +15,12 @@ from typing import Any
 
 import rosz
 from rosz.msgs.geometry_msgs.msg import Twist
-from rosz.msgs.sensor_msgs.msg import Image
+from rosz.msgs.sensor_msgs.msg import Image, LaserScan
 
 _SECONDS = 1.0
 _CALM = 0.3
 _QUEUE = 1000
+_BEAMS = 360
 _MEGABYTE = 1_000_000
 
 
@@ -46,12 +47,14 @@ def open_node(
 
 
 def main(role: str, library: str, kind_name: str) -> None:
-    kind: Any = {"Twist": Twist, "Image": Image}[kind_name]
+    kind: Any = {"Twist": Twist, "LaserScan": LaserScan, "Image": Image}[kind_name]
     publisher, subscribe = open_node(library, role, kind)
     if role == "pour":
         message, publish = kind(), publisher()
         if kind is Image:
             message.data = bytes(_MEGABYTE)
+        elif kind is LaserScan:
+            message.ranges = message.intensities = [1.5] * _BEAMS
         while True:
             for _ in range(10):
                 publish(message)
