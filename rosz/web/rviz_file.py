@@ -9,38 +9,70 @@ from typing import Any
 import yaml
 
 from rosz.errors import RoszError, UsageError
-from rosz.web.scene import DESCRIPTION, GRID, ROBOT, TF, Look, Setup
+from rosz.web.scene import AXES, DESCRIPTION, GRID, ROBOT, TF, Look, Setup
 
 __all__ = ("read_rviz",)
 
 _TOPIC = "Topic"
-_TOPICS = {
+_TOPICS = dict.fromkeys(
+    (
+        "AccelStamped",
+        "BoundingBox",
+        "BoundingBoxArray",
+        "CameraInfo",
+        "GridCells",
+        "Imu",
+        "LaserScan",
+        "Map",
+        "NormalDisplay",
+        "Odometry",
+        "Path",
+        "PointCloud",
+        "PointCloud2",
+        "PointStamped",
+        "Polygon",
+        "PolygonArray",
+        "Pose",
+        "PoseArray",
+        "PoseWithCovariance",
+        "Range",
+        "TwistStamped",
+        "Wrench",
+        "WrenchStamped",
+    ),
+    _TOPIC,
+) | {
     "Camera": "Image Topic",
-    "GridCells": _TOPIC,
     "Image": "Image Topic",
-    "LaserScan": _TOPIC,
-    "Map": _TOPIC,
     "Marker": "Marker Topic",
     "MarkerArray": "Marker Topic",
-    "Odometry": _TOPIC,
-    "Path": _TOPIC,
-    "PointCloud": _TOPIC,
-    "PointCloud2": _TOPIC,
-    "PointStamped": _TOPIC,
-    "Polygon": _TOPIC,
-    "Pose": _TOPIC,
-    "PoseArray": _TOPIC,
-    "PoseWithCovariance": _TOPIC,
-    "Range": _TOPIC,
-    "WrenchStamped": _TOPIC,
+    "OverlayImage": _TOPIC,
 }
+"""The displays of rviz and its plugins that show one topic, and the key that names it."""
+_PARTLY = {
+    "Camera": "the image is beside the view, and things in space are not drawn over it",
+    "MotionPlanning": "only the robot is shown",
+    "NormalDisplay": "only the points are shown",
+    "OverlayImage": "the image is beside the view",
+    "PlanningScene": "only the robot is shown",
+    "RobotState": "the robot is shown as its frames are",
+    "Trajectory": "only the robot is shown",
+}
+_INSTEAD = {
+    "Plotter2D": "see the page /plot",
+    "OverlayText": "see the page /topics",
+    "String": "see the page /topics",
+    "Effort": "see the page /plot",
+}
+"""What is said of other displays."""
 _COLORS = {"AxisColor": "height", "Intensity": "intensity", "RGB8": "rgb"}
-_PICTURES = ("Camera", "Image")
-_CLOUDS = ("LaserScan", "PointCloud", "PointCloud2")
+_PICTURES = ("Camera", "Image", "OverlayImage")
+_ROBOTS = ("MotionPlanning", "PlanningScene", "RobotModel", "RobotState", "Trajectory")
+_CLOUDS = ("LaserScan", "NormalDisplay", "PointCloud", "PointCloud2")
 
 
 def read_rviz(path: Path, resolve: Callable[[str], str]) -> tuple[Setup, list[str]]:
-    """Return the setup that a file of rviz describes, and the displays that are not shown.
+    """Return the setup that a file of rviz describes, and what is not shown of it, with the reason.
 
     Args:
         path: The file.
@@ -64,14 +96,16 @@ def read_rviz(path: Path, resolve: Callable[[str], str]) -> tuple[Setup, list[st
     looks: list[Look] = []
     left_out: list[str] = []
     for one in listed:
+        kind = str(one.get("Class", "")).rpartition("/")[2]
         try:
-            look = _look(one, resolve)
+            look = _look(one, kind, resolve)
         except RoszError as error:
-            left_out.append(f"{one.get('Name', 'a display')} ({error})")
+            left_out.append(f"{_title(one)}: {error}")
             continue
-        if look is None:
-            left_out.append(f"{one.get('Name', 'a display')} ({one.get('Class', 'no class')})")
-        elif all(look.name != known.name for known in looks):
+        why = _PARTLY.get(kind, "") if look is not None else _why_not(kind)
+        if why:
+            left_out.append(f"{_title(one)}: {why}")
+        if look is not None and look not in looks:
             looks.append(look)
     frame = str(options.get("Fixed Frame", "")).removeprefix("/")
     above = "top" if view.endswith("TopDownOrtho") else "orbit"
@@ -87,19 +121,34 @@ def _displays(listed: list[Any]) -> Iterator[dict[str, Any]]:
                 yield one
 
 
-def _look(display: dict[str, Any], resolve: Callable[[str], str]) -> Look | None:
+def _title(display: dict[str, Any]) -> str:
+    return f"{display.get('Name', 'a display')} ({display.get('Class', 'no class')})"
+
+
+def _why_not(kind: str) -> str:
+    """Return why a display of rviz is not shown."""
+    if kind in _TOPICS:
+        return "it names no topic"
+    return _INSTEAD.get(kind, "there is no such display here")
+
+
+def _look(display: dict[str, Any], kind: str, resolve: Callable[[str], str]) -> Look | None:
     """Return the display of the view for one of rviz; None if there is none.
 
     Raises:
         InvalidName: The name of its topic is not legal.
     """
-    kind = str(display.get("Class", "")).rpartition("/")[2]
     visible = bool(display.get("Enabled", True))
     if kind == "Grid":
-        return Look(GRID, size=_number(display.get("Cell Size"), 1.0), visible=visible)
+        cells = int(_number(display.get("Plane Cell Count"), 0.0))
+        size = _number(display.get("Cell Size"), 1.0)
+        return Look(GRID, size=size, visible=visible, frame=_frame(display), cells=cells)
+    if kind == "Axes":
+        size, radius = _number(display.get("Length"), 0.0), _number(display.get("Radius"), 0.0)
+        return Look(AXES, size=size, visible=visible, frame=_frame(display), radius=radius)
     if kind == "TF":
         return Look(TF, size=0.3 * _number(display.get("Marker Scale"), 0.0), visible=visible)
-    if kind == "RobotModel":
+    if kind in _ROBOTS:
         name = resolve(str(display.get("Robot Description") or DESCRIPTION[1:]))
         prefix = str(display.get("TF Prefix") or "").strip("/")
         return Look(
@@ -111,6 +160,12 @@ def _look(display: dict[str, Any], resolve: Callable[[str], str]) -> Look | None
     if kind not in _TOPICS or not topic:
         return None
     return _look_at_topic(display, kind, resolve(str(topic)), visible=visible)
+
+
+def _frame(display: dict[str, Any]) -> str:
+    """Return the frame that a display is at; empty for the fixed one."""
+    frame = str(display.get("Reference Frame") or "").removeprefix("/")
+    return "" if frame.startswith("<") else frame
 
 
 def _look_at_topic(display: dict[str, Any], kind: str, name: str, *, visible: bool) -> Look:

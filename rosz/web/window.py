@@ -183,7 +183,7 @@ def _page_of_rviz(
     setup, left_out = read_rviz(Path(file), resolve)
     if fixed:
         setup = msgspec.structs.replace(setup, frame=fixed)
-    return format_setup(setup), [f"not shown: {', '.join(left_out)}"] if left_out else []
+    return format_setup(setup), [f"not shown: {'; '.join(left_out)}"] if left_out else []
 
 
 def main(name: str) -> None:

@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from network import Network, eventually
 
 from rosz.environment import Environment
+from rosz.errors import UsageError
 from rosz.msgs.geometry_msgs.msg import (
+    Accel,
+    AccelStamped,
     Point,
+    Point32,
+    Polygon,
+    PolygonStamped,
     Pose,
     PoseWithCovariance,
     Quaternion,
+    Twist,
+    TwistStamped,
     Vector3,
     Wrench,
     WrenchStamped,
 )
 from rosz.msgs.nav_msgs.msg import GridCells, Odometry
-from rosz.msgs.sensor_msgs.msg import Image
+from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, Imu
 from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY
 from rosz.web.model import Frames, Permission, System
 from rosz.web.scene import Look, Meshes, Setup, format_setup, open_display, read_setup
+from rosz.web.scene.cameras import draw_camera
+from rosz.web.scene.detections import draw_boxes, draw_polygons
 from rosz.web.scene.display import FrameDisplay
 from rosz.web.scene.drawing import Drawing
-from rosz.web.scene.poses import Trail, draw_cells, draw_wrench
+from rosz.web.scene.poses import Trail, draw_cells
 from rosz.web.scene.robot import RobotDisplay
+from rosz.web.scene.vectors import draw_accel, draw_imu, draw_twist, draw_wrench
 
 from .test_scene import ASIDE, parts
 
@@ -69,6 +82,51 @@ def test_cells_and_wrenches_are_drawn() -> None:
     assert np.allclose(force["matrices"][0, :3, 3], (1.5, 2, 0))
     assert np.allclose(torque["matrices"][0, :3, 3], (0, 0, 1))
     draw_wrench(WrenchStamped(), IDENTITY, Look("/w"), Drawing())
+
+
+def test_speeds_accelerations_and_inertial_sensors_are_drawn() -> None:
+    drawing = Drawing()
+    twist = TwistStamped(twist=Twist(linear=Vector3(3, 4, 0), angular=Vector3(0, 0, 2)))
+    assert draw_twist(twist, IDENTITY, Look("/v"), drawing) == "linear 5.00, angular 2.00"
+    assert len(parts(drawing)) == 2
+    accel = AccelStamped(accel=Accel(linear=Vector3(0, 1, 0)))
+    assert draw_accel(accel, IDENTITY, Look("/a"), Drawing()) == "linear 1.00, angular 0.00"
+    drawing = Drawing()
+    imu = Imu(orientation=FLAT, linear_acceleration=Vector3(0, 0, 9.8))
+    assert draw_imu(imu, IDENTITY, Look("/imu"), drawing) == "acceleration 9.80"
+    assert len(parts(drawing)) == 4
+    drawing = Drawing()
+    imu.orientation_covariance[0] = -1.0
+    draw_imu(imu, IDENTITY, Look("/imu"), drawing)
+    assert len(parts(drawing)) == 1
+
+
+def test_what_a_camera_sees_is_a_pyramid() -> None:
+    info = CameraInfo(height=100, width=200, k=[100.0, 0, 100, 0, 100.0, 50, 0, 0, 1])
+    drawing = Drawing()
+    assert draw_camera(info, ASIDE, Look("/info", size=2.0), drawing) == "200 x 100"
+    (lines,) = parts(drawing)
+    assert lines["count"] == 16
+    assert np.allclose(lines["positions"][1], (12.0, 1.0, 2.0))
+    with pytest.raises(UsageError, match="not calibrated"):
+        draw_camera(CameraInfo(height=1, width=1), IDENTITY, Look("/info"), Drawing())
+
+
+def test_recognised_things_are_drawn() -> None:
+    half = Vector3(1, 2, 3)
+    box = SimpleNamespace(pose=Pose(Point(1, 0, 0), FLAT), dimensions=half, label=1)
+    drawing = Drawing()
+    array = SimpleNamespace(boxes=[box, box])
+    assert draw_boxes(array, IDENTITY, Look("/boxes"), drawing) == "2 boxes"
+    lines, cube = parts(drawing)[:2]
+    assert np.allclose(lines["positions"].max(axis=0), (1.5, 1, 1.5))
+    assert np.allclose(cube["matrices"][0].diagonal(), (1, 2, 3, 1))
+    drawing = Drawing()
+    polygon = PolygonStamped(polygon=Polygon([Point32(0, 0, 0), Point32(1, 0, 0)]))
+    planes = SimpleNamespace(polygons=[polygon, polygon], labels=[])
+    assert draw_polygons(planes, IDENTITY, Look("/planes"), drawing) == "2 polygons"
+    first, second = parts(drawing)
+    assert first["colors"].tolist() != second["colors"].tolist()
 
 
 def test_an_address_holds_what_stays_and_the_prefix() -> None:

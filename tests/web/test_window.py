@@ -27,6 +27,12 @@ Visualization Manager:
     - {Class: rviz/Grid, Name: Grid, Enabled: true, Cell Size: 0.5, Color: 160; 160; 164}
     - {Class: rviz/RobotModel, Name: Robot, Enabled: true, Robot Description: robot_description}
     - {Class: rviz/TF, Name: TF, Enabled: false, Marker Scale: 1}
+    - {Class: rviz/Axes, Name: Axes, Length: 0.5, Radius: 0.05, Reference Frame: base_link}
+    - {Class: rviz/Axes, Name: Axes, Length: 1, Radius: 0.1, Reference Frame: <Fixed Frame>}
+    - {Class: rviz/Grid, Name: Fine, Cell Size: 0.1, Plane Cell Count: 100, Reference Frame: map}
+    - {Class: moveit_rviz_plugin/MotionPlanning, Name: Planning, Robot Description: arm}
+    - {Class: jsk_rviz_plugin/PolygonArray, Name: Planes, Topic: /planes}
+    - {Class: rviz/Image, Name: Nothing, Image Topic: ""}
     - Class: rviz/Group
       Name: Sensors
       Displays:
@@ -139,6 +145,11 @@ def test_a_file_of_rviz_is_a_setup(tmp_path: Path) -> None:
             Look("grid", size=0.5),
             Look("robot"),
             Look("tf", size=0.3, visible=False),
+            Look("axes", size=0.5, frame="base_link", radius=0.05),
+            Look("axes", size=1.0, radius=0.1),
+            Look("grid", size=0.1, frame="map", cells=100),
+            Look("robot:/arm"),
+            Look("/planes"),
             Look("/scan", "#ff0000", 5),
             Look("/cloud", "height"),
             Look("/image"),
@@ -150,13 +161,19 @@ def test_a_file_of_rviz_is_a_setup(tmp_path: Path) -> None:
         ),
         "top",
     )
-    assert left_out[0] == "Handles (rviz/InteractiveMarkers)"
-    assert left_out[1].startswith("Bad (")
+    assert left_out[:4] == [
+        "Planning (moveit_rviz_plugin/MotionPlanning): only the robot is shown",
+        "Nothing (rviz/Image): it names no topic",
+        "Camera (rviz/Camera): the image is beside the view, and things in space are not drawn"
+        " over it",
+        "Handles (rviz/InteractiveMarkers): there is no such display here",
+    ]
+    assert left_out[4].startswith("Bad (rviz/Pose): ")
     looks = {one.name for one in read_rviz(file, full)[0].looks}
     assert {"/base_scan", "/ns/cloud", "robot:/ns/robot_description", "/image"} <= looks
     page, notes = page_of("rviz", ["-d", str(file), "-f", "map"], plain)
     assert page.startswith("/3d?frame=map&show=grid;size=0.5,robot,")
-    assert notes == [f"not shown: {', '.join(left_out)}"]
+    assert notes == [f"not shown: {'; '.join(left_out)}"]
 
 
 @pytest.mark.parametrize("text", ["[General]\nx=1", "a: [", "Panels: []", "- 1", "\x00"])
@@ -200,7 +217,7 @@ def test_windows_open_where_a_page_is_served(network: Network) -> None:
     launch = network.run("-m", "rosz", "launch", str(file), DISPLAY="", WAYLAND_DISPLAY="")
     launch.wait_for(f"{found[1]}/3d?frame=odom&show=grid", LONG)
     assert "/base_scan;color=" in launch.output
-    launch.wait_for("not shown: Handles (rviz/InteractiveMarkers)", LONG)
+    launch.wait_for("not shown: Planning (moveit_rviz_plugin/MotionPlanning): only", LONG)
     launch.wait_for("press Ctrl-C", LONG)
 
 

@@ -15,7 +15,7 @@ from rosz.introspect.subscribe import find_class, find_token, topic_types
 from rosz.names import short_type
 from rosz.transforms import IDENTITY, Pose
 from rosz.web.model import Frames, ImageWatch, read_frame
-from rosz.web.scene import poses, sensors
+from rosz.web.scene import cameras, detections, poses, sensors, vectors
 from rosz.web.scene.colors import color_bytes
 from rosz.web.scene.drawing import MEDIA, Drawing
 from rosz.web.scene.setup import Look
@@ -38,6 +38,7 @@ _MOST_BYTES = 32 << 20
 
 _Draw = Callable[[Any, Pose, Look, Drawing], str]
 _DRAW: dict[str, _Draw] = {
+    "geometry_msgs/AccelStamped": vectors.draw_accel,
     "geometry_msgs/Point": poses.draw_point,
     "geometry_msgs/PointStamped": poses.draw_point,
     "geometry_msgs/Polygon": poses.draw_polygon,
@@ -46,10 +47,16 @@ _DRAW: dict[str, _Draw] = {
     "geometry_msgs/PoseArray": poses.draw_poses,
     "geometry_msgs/PoseStamped": poses.draw_stamped_pose,
     "geometry_msgs/PoseWithCovarianceStamped": poses.draw_stamped_pose,
-    "geometry_msgs/WrenchStamped": poses.draw_wrench,
+    "geometry_msgs/TwistStamped": vectors.draw_twist,
+    "geometry_msgs/WrenchStamped": vectors.draw_wrench,
+    "jsk_recognition_msgs/BoundingBox": detections.draw_box,
+    "jsk_recognition_msgs/BoundingBoxArray": detections.draw_boxes,
+    "jsk_recognition_msgs/PolygonArray": detections.draw_polygons,
     "nav_msgs/GridCells": poses.draw_cells,
     "nav_msgs/Odometry": poses.draw_stamped_pose,
     "nav_msgs/Path": poses.draw_path,
+    "sensor_msgs/CameraInfo": cameras.draw_camera,
+    "sensor_msgs/Imu": vectors.draw_imu,
     "sensor_msgs/LaserScan": sensors.draw_scan,
     "sensor_msgs/PointCloud": sensors.draw_old_cloud,
     "sensor_msgs/PointCloud2": sensors.draw_cloud,

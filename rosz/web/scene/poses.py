@@ -23,8 +23,8 @@ __all__ = (
     "draw_pose",
     "draw_poses",
     "draw_stamped_pose",
-    "draw_wrench",
     "pose_from",
+    "rotation_from",
 )
 
 _LENGTH = 1.0
@@ -36,13 +36,18 @@ _STEP, _TURN = 0.1, 0.1
 """Metres and radians that a pose differs from the last one that stays, as in rviz."""
 
 
-def pose_from(message: Any) -> Pose:
-    """Return the pose of a geometry_msgs/Pose; one without a rotation is not rotated."""
-    p, q = message.position, message.orientation
+def rotation_from(q: Any) -> tuple[float, float, float, float]:
+    """Return a geometry_msgs/Quaternion with length 1; none is no rotation."""
     length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
     if not length or not math.isfinite(length):
-        return Pose((p.x, p.y, p.z), (0.0, 0.0, 0.0, 1.0))
-    return Pose((p.x, p.y, p.z), (q.x / length, q.y / length, q.z / length, q.w / length))
+        return 0.0, 0.0, 0.0, 1.0
+    return q.x / length, q.y / length, q.z / length, q.w / length
+
+
+def pose_from(message: Any) -> Pose:
+    """Return the pose of a geometry_msgs/Pose; one without a rotation is not rotated."""
+    p = message.position
+    return Pose((p.x, p.y, p.z), rotation_from(message.orientation))
 
 
 def draw_pose(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
@@ -107,20 +112,6 @@ def _differ(one: Pose, other: Pose) -> bool:
     along = math.dist(one.translation, other.translation)
     cosine = abs(sum(a * b for a, b in zip(one.rotation, other.rotation, strict=True)))
     return along > _STEP or 2 * math.acos(min(cosine, 1.0)) > _TURN
-
-
-def draw_wrench(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
-    """Draw a WrenchStamped: its force, and its torque in another color."""
-    size = look.size or _LENGTH
-    texts = []
-    for name, vector, color in (
-        ("force", message.wrench.force, color_bytes(look.color, "#cc3333")),
-        ("torque", message.wrench.torque, color_bytes("#c9a227")),
-    ):
-        ends = moved(np.array([(0.0, 0.0, 0.0), (vector.x, vector.y, vector.z)]) * size, pose)
-        draw_line(drawing, ends, color, size / 20)
-        texts.append(f"{name} {math.hypot(vector.x, vector.y, vector.z):.2f}")
-    return ", ".join(texts)
 
 
 def draw_cells(message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
