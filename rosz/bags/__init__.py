@@ -58,6 +58,7 @@ PUBLIC_MODULES = (
     "ros1_reader",
     "summary",
     "tables",
+    "writing",
 )
 
 __all__ = (

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Self
 
 from rosz.bags.bag import SMALL, Attachment, Channel, Compression, Payload
-from rosz.bags.writing import mark_written
+from rosz.bags.writing import BagUnfinished, mark_written
 from rosz.errors import BagError, ClosedError
 from rosz.worker import Worker
 
@@ -338,10 +338,8 @@ class ChunkWriter:
             with suppress(OSError):  # a pipe, or a disk that is gone
                 os.ftruncate(self._file, self._offset)
                 os.lseek(self._file, self._offset, os.SEEK_SET)
-            raise BagError(
-                f"cannot write to it: {error.strerror}; what was written before can be read",
-                str(self.path),
-                self._offset,
+            raise BagUnfinished(
+                error.strerror or str(error), str(self.path), self._offset
             ) from error
         self._offset += done
 

@@ -13,7 +13,7 @@ from rosz.bags.bag import BagReader, BagWriter, Channel, Compression, Entry
 from rosz.bags.messages import class_of
 from rosz.bags.opening import ACTIVE, create_writer, open_reader
 from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
-from rosz.bags.writing import refuse_written
+from rosz.bags.writing import refuse_written, removed_unfinished
 from rosz.errors import BagError, RoszError
 from rosz.typestore import TypeStore
 
@@ -153,7 +153,7 @@ def rewrite(
         holder.mkdir()
     except OSError as error:
         raise BagError(f"cannot create it: {error.strerror}", str(holder)) from error
-    try:
+    with removed_unfinished(holder, target):
         made = holder / name
         copied = recover(path, made, compression=wanted, like=True)
         if backup is not None:
@@ -161,8 +161,7 @@ def rewrite(
                 shutil.rmtree(backup)
             path.replace(backup)
         made.replace(target)
-    finally:
-        shutil.rmtree(holder)
+        holder.rmdir()
     return msgspec.structs.replace(copied, path=target, backup=backup)
 
 

@@ -20,6 +20,7 @@ from rosz.bags.bag import Attachment, BagWriter, Channel, Compression, Payload
 from rosz.bags.mcap_writer import McapWriter
 from rosz.bags.qos_text import format_profiles, profile_rows
 from rosz.bags.rosbag2_reader import METADATA, METADATA_RECORD, Storage, zstandard_library
+from rosz.bags.writing import BagUnfinished
 from rosz.errors import BagError, ClosedError, UsageError
 
 __all__ = ("Rosbag2Writer",)
@@ -85,9 +86,7 @@ class _SqliteWriter:
             with self._database:
                 self._database.executemany(query, rows)
         except sqlite3.Error as error:
-            raise BagError(
-                f"cannot write to it: {error}; what was written before can be read", str(self.path)
-            ) from error
+            raise BagUnfinished(str(error), str(self.path)) from error
 
     def add(self, channel: Channel) -> int:
         self._channels.append(channel)

@@ -1,17 +1,63 @@
-"""Locks that distinguish a bag that is being written from one whose writer was killed.
+"""Bags that are being written, and what is left of those that cannot be finished.
 
-A writer locks its file, and the system unlocks it when the process ends in whatever way.
+A writer locks its file, and the system unlocks it when the process ends in whatever way. So a bag
+that is being written differs from one whose writer was killed.
 """
 
 from __future__ import annotations
 
 import fcntl
 import os
-from contextlib import suppress
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from rosz.errors import BagError, BagUnindexed
 
-__all__ = ("mark_written", "refuse_written", "unindexed")
+__all__ = ("BagUnfinished", "mark_written", "refuse_written", "removed_unfinished", "unindexed")
+
+
+class BagUnfinished(BagError):
+    """A bag that cannot be written any further.
+
+    Args:
+        cause: What the system says.
+        path: Path of the file.
+        offset: Offset in bytes at which writing failed; -1 if unknown.
+
+    Attributes:
+        cause: As given.
+    """
+
+    def __init__(self, cause: str, path: str, offset: int = -1) -> None:
+        self.cause = cause
+        reason = f"cannot write to it: {cause}; what was written before can be read"
+        super().__init__(reason, path, offset)
+
+
+@contextmanager
+def removed_unfinished(made: Path, target: str | os.PathLike[str]) -> Iterator[None]:
+    """Return a context that removes a file or folder if the body fails.
+
+    Args:
+        made: The file or folder.
+        target: The bag that it was to become.
+
+    Raises:
+        BagError: It cannot be written; the error names the bag that it was to become.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if made.is_dir():
+            shutil.rmtree(made)
+        else:
+            made.unlink(missing_ok=True)
+        if isinstance(error, BagUnfinished):
+            reason = f"cannot write it: {error.cause}; what was written has been removed"
+            raise BagError(reason, os.fspath(target)) from error
+        raise
 
 
 def mark_written(file: int) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,14 @@ from rosz.cli.main import run
 from rosz.errors import BagError
 from rosz.msgs.std_msgs.msg import String
 
+NO_ROOM = """
+import resource, sys
+from rosz.cli.main import run
+_, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, most))
+for words in sys.argv[1:]:
+    print(run(["bag", *words.split()]), file=sys.stderr)
+"""
 CHATTER = Channel("/chatter", "std_msgs/msg/String", definition="string data\n")
 COUNT = 500
 
@@ -147,3 +157,31 @@ def test_types_that_differ_are_named(tmp_path: Path, capsys: pytest.CaptureFixtu
         writer.write(handle, 1, random.Random(1).randbytes(8))
     assert run(["bag", "check", str(path)]) == 1
     assert "std_msgs/msg/String: its hash is " in capsys.readouterr().out
+
+
+def test_what_is_left_of_a_bag_for_which_there_is_no_room(tmp_path: Path) -> None:
+    with McapWriter(tmp_path / "a.mcap") as writer:
+        handle = writer.add(CHATTER)
+        for number in range(COUNT):
+            writer.write(handle, number, String(data="hello" * 1000).to_cdr())
+    begun = (tmp_path / "a.mcap").read_bytes()
+    words = ("reindex a.mcap", "filter a.mcap b.mcap", "filter a.mcap c.bag", "convert a.mcap d/")
+    command = [sys.executable, "-c", NO_ROOM, *words]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=300
+    )
+    told = [line for line in done.stderr.splitlines() if "write" in line or line.isdigit()]
+    removed = "cannot write it: File too large; what was written has been removed"
+    assert told[:-2] == [
+        *(f"ERROR: a.mcap: {removed}", "1"),
+        *(f"ERROR: b.mcap: {removed}", "1"),
+        *(f"ERROR: c.bag: {removed}", "1"),
+    ]
+    assert told[-2].startswith("ERROR: d/d_0.mcap at byte ")
+    assert told[-2].endswith(
+        "cannot write to it: File too large; what was written before can be read"
+    )
+    assert {one.name for one in tmp_path.iterdir()} == {"a.mcap", "d"}
+    assert (tmp_path / "a.mcap").read_bytes() == begun
+    count, _ = check_bag(tmp_path / "d")
+    assert 0 < count < COUNT

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -106,6 +105,7 @@ def filter_command(
 def _created(output: str, compression: str) -> Iterator[BagWriter]:
     """Create a bag; a file of its name is replaced when the new one is complete."""
     from rosz.bags import create_writer, form_of
+    from rosz.bags.writing import removed_unfinished
 
     form, wanted = form_of(output), _compression(compression)
     target = Path(output)
@@ -113,7 +113,7 @@ def _created(output: str, compression: str) -> Iterator[BagWriter]:
     if form != "rosbag2":
         made = target.with_name(f".{target.stem}.part{os.getpid()}{target.suffix}")
     writer = create_writer(made, compression=wanted, form=form, replace=True)
-    try:
+    with removed_unfinished(made, output):
         with writer:
             yield writer
         if made != target:
@@ -121,12 +121,6 @@ def _created(output: str, compression: str) -> Iterator[BagWriter]:
                 made.replace(target)
             except OSError as error:
                 raise BagError(f"cannot create it: {error.strerror}", output) from error
-    except BaseException:
-        if made.is_dir():
-            shutil.rmtree(made)
-        else:
-            made.unlink(missing_ok=True)
-        raise
 
 
 @app.command("convert")
