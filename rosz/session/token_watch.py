@@ -22,7 +22,8 @@ class TokenWatch:
 
     Seen with eclipse-zenoh 1.10.2: a watch that begins while tokens disappear may be told of the
     end of some of these first, and then that they exist. `tests/interop/test_hostile.py` shows it;
-    it is not reported upstream yet.
+    it is not reported upstream yet. Only for such tokens a query decides: while tokens come and go,
+    a query may miss some that exist.
 
     Args:
         callback: Function called with the key of a token, and with whether it appeared (true) or
@@ -106,9 +107,8 @@ class TokenWatch:
             return
         if alive:
             self._appeared.add(token)
-        else:
-            self._appeared.discard(token)
-            self._gone.add(token)
+        elif token not in self._appeared:
+            self._gone.add(token)  # one that was told of before may truly come again
 
     def _vanished(self) -> set[str]:
         """Return the tokens that have disappeared unnoticed."""
