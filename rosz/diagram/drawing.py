@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from html import escape
 
+from rosz.diagram.labels import place_labels
 from rosz.diagram.layers import Layout, Place, lay_out
 from rosz.diagram.picture import Arrow, Box, Picture
 
@@ -13,17 +14,23 @@ __all__ = ("label_of", "labels_of", "write_dot", "write_mermaid", "write_svg")
 _FEW = 2
 _LETTER = 6.3
 _LABEL_STEP = 8
+_RATE_LETTERS = 7
+"""Room for a rate that gets longer while the picture stays."""
 _NARROWEST_GAP, _WIDEST_GAP = 72.0, 260.0
 _GROUP_MARGIN = 8.0
 _STYLE = """
-text { font: 12px system-ui, sans-serif; fill: var(--graph-text, #1c2433) }
+text { font: 12px system-ui, sans-serif; fill: var(--graph-text, #1c2433); text-anchor: middle }
 .node rect { fill: var(--graph-node, #e3ecff); stroke: var(--graph-node-line, #2456c8) }
 .topic rect { fill: var(--graph-topic, #f4f1e8); stroke: var(--graph-topic-line, #a08a4a) }
 .group { fill: none; stroke: var(--graph-line, #8f9bb0); stroke-dasharray: 4 3 }
 .arrow path { fill: none; stroke: var(--graph-line, #8f9bb0); stroke-width: 1.4 }
+.group-name { text-anchor: start }
 .arrow text, .group-name { font-size: 11px; fill: var(--graph-soft, #5b6577) }
 .arrow text { paint-order: stroke; stroke: var(--graph-back, #ffffff); stroke-width: 4px;
   stroke-linejoin: round }
+.arrow .crowded { display: none }
+.arrow:hover path { stroke: var(--graph-node-line, #2456c8); stroke-width: 2.5 }
+.arrow:hover .crowded { display: inline; fill: var(--graph-text, #1c2433) }
 .tip { fill: var(--graph-line, #8f9bb0) }
 .node, .topic { cursor: pointer }
 .chosen rect { stroke-width: 3 }
@@ -76,6 +83,8 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
     longest = max(wide, max(map(len, plain), default=0) + _LABEL_STEP * bool(rates))
     gap = min(_WIDEST_GAP, max(_NARROWEST_GAP, longest * _LETTER + 24))
     layout = lay_out(picture, gap)
+    room = _RATE_LETTERS if rates else 0
+    places = place_labels(layout.paths, [len(one) and max(len(one), room) for one in labels])
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="nodes and topics"'
         f' viewBox="0 0 {layout.width:.0f} {layout.height:.0f}" width="{layout.width:.0f}"'
@@ -84,9 +93,9 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
         '<path class="tip" d="M0 0L8 4L0 8z"/></marker></defs>',
         *_groups(layout),
         *(
-            _arrow(arrow, path, label, number)
-            for number, (arrow, path, label) in enumerate(
-                zip(picture.arrows, layout.paths, labels, strict=True)
+            _arrow(arrow, path, _text(number, label, place))
+            for number, (arrow, path, label, place) in enumerate(
+                zip(picture.arrows, layout.paths, labels, places, strict=True)
             )
         ),
         *(_box(place, chosen) for place in layout.places.values()),
@@ -104,23 +113,25 @@ def _box(place: Place, chosen: str) -> str:
     return (
         f'<g class="{kind}" data-key="{key}" tabindex="0" role="button"><title>{title}</title>'
         f'<rect x="{place.x:.1f}" y="{place.y:.1f}" width="{place.width:.1f}"'
-        f' height="{place.height:.1f}" rx="{radius:.0f}"/><text text-anchor="middle"'
+        f' height="{place.height:.1f}" rx="{radius:.0f}"/><text'
         f' x="{place.x + place.width / 2:.1f}" y="{place.y + place.height / 2 + 4:.1f}">{name}'
         "</text></g>"
     )
 
 
-def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], label: str, number: int) -> str:
-    (left, up), (right, down) = path[0], path[1]
-    text = (
-        f'<text data-arrow="{number}" text-anchor="middle" x="{(left + right) / 2:.1f}"'
-        f' y="{(up + down) / 2 - 4:.1f}">{escape(label)}</text>'
-    )
+def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], text: str) -> str:
     title = escape(", ".join(arrow.topics))
     return (
         f'<g class="arrow"><title>{title}</title><path d="{_curve(path)}" marker-end="url(#tip)"/>'
         f"{text}</g>"
     )
+
+
+def _text(number: int, label: str, place: tuple[float, float, bool]) -> str:
+    """Return the label of an arrow, which is hidden until one points at it if it has no room."""
+    x, y, has_room = place
+    kind = "" if has_room else ' class="crowded"'
+    return f'<text data-arrow="{number}"{kind} x="{x:.0f}" y="{y - 3:.0f}">{escape(label)}</text>'
 
 
 def _curve(path: Sequence[tuple[float, float]]) -> str:

@@ -8,8 +8,9 @@ layer is put into the order of the mean places of its neighbours, and boxes move
 from __future__ import annotations
 
 import itertools
+import operator
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 
 import msgspec
@@ -65,24 +66,49 @@ class Layout(msgspec.Struct, frozen=True):
     height: float
 
 
-class _Vertex:
-    """A box, or a bend of an arrow."""
+class _Graph:
+    """The vertices of a picture, by number: its boxes, and the bends of its arrows.
 
-    __slots__ = ("after", "before", "box", "height", "layer", "order", "width", "y")
+    Numbers and lists, since an arrow over many layers has a bend in each, and a large picture
+    some ten thousand.
 
-    def __init__(self, box: Box | None, layer: int) -> None:
-        self.box = box
-        self.layer = layer
-        self.order = 0.0
-        self.y = 0.0
-        self.width = 0.0 if box is None else max(_NARROWEST, len(box.name) * _LETTER + 24)
-        self.height = 0.0 if box is None else _HEIGHT[box.kind]
-        self.before: list[_Vertex] = []
-        self.after: list[_Vertex] = []
+    Args:
+        picture: The picture.
 
-    @property
-    def gap(self) -> float:
-        return _BEND_GAP if self.box is None else _BETWEEN_ROWS
+    Attributes:
+        boxes: The boxes, which are the first vertices.
+        layer: Layer of each vertex.
+        before: The neighbours of each vertex in the layer before its own.
+        after: Those in the layer behind it.
+    """
+
+    def __init__(self, picture: Picture) -> None:
+        self.boxes = picture.boxes
+        self.widths = [max(_NARROWEST, len(box.name) * _LETTER + 24) for box in self.boxes]
+        self.heights = [_HEIGHT[box.kind] for box in self.boxes]
+        self.layer: list[int] = []
+        self.before: list[list[int]] = [[] for _ in self.boxes]
+        self.after: list[list[int]] = [[] for _ in self.boxes]
+
+    def add_bend(self, layer: int) -> int:
+        """Add a bend in a layer, and return its number."""
+        self.layer.append(layer)
+        self.before.append([])
+        self.after.append([])
+        return len(self.layer) - 1
+
+    def join(self, one: int, other: int) -> None:
+        """Make vertices of adjacent layers neighbours."""
+        self.after[one].append(other)
+        self.before[other].append(one)
+
+    def height(self, vertex: int) -> float:
+        """Return the height of a vertex."""
+        return self.heights[vertex] if vertex < len(self.boxes) else 0.0
+
+    def gap(self, vertex: int) -> float:
+        """Return how far a vertex keeps from others of its layer."""
+        return _BETWEEN_ROWS if vertex < len(self.boxes) else _BEND_GAP
 
 
 @lru_cache(maxsize=4)
@@ -97,12 +123,12 @@ def lay_out(picture: Picture, gap: float = 64.0) -> Layout:
     edges = [(arrow.start, arrow.end) for arrow in picture.arrows]
     forward = _acyclic(keys, edges)
     layer_of = _layer(keys, [pair for pair in forward if pair[0] != pair[1]])
-    vertices = {box.key: _Vertex(box, layer_of[box.key]) for box in picture.boxes}
-    chains = _chain(vertices, forward)
-    layers = _collect(vertices, chains)
-    _order(layers)
-    _place(layers)
-    return _measure(picture, vertices, chains, layers, forward, gap)
+    graph = _Graph(picture)
+    graph.layer += [layer_of[key] for key in keys]
+    chains = _chain(graph, forward)
+    layers = _collect(graph, chains)
+    _order(graph, layers)
+    return _measure(picture, graph, chains, layers, _place(graph, layers), gap)
 
 
 def _acyclic(keys: Sequence[str], edges: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
@@ -156,190 +182,212 @@ def _layer(keys: Sequence[str], edges: Iterable[tuple[str, str]]) -> dict[str, i
     return layer
 
 
-def _chain(
-    vertices: Mapping[str, _Vertex], edges: Sequence[tuple[str, str]]
-) -> list[list[_Vertex]]:
+def _chain(graph: _Graph, edges: Sequence[tuple[str, str]]) -> list[list[int]]:
     """Join the boxes of each edge, by a bend in each layer between them."""
-    spans = sum(abs(vertices[end].layer - vertices[start].layer) for start, end in edges)
+    number = {box.key: number for number, box in enumerate(graph.boxes)}
+    ends = [(number[start], number[end]) for start, end in edges]
+    spans = sum(abs(graph.layer[last] - graph.layer[first]) for first, last in ends)
     bends = spans <= _MOST_BENDS
-    chains: list[list[_Vertex]] = []
-    for start, end in edges:
-        first, last = vertices[start], vertices[end]
-        between = range(first.layer + 1, last.layer) if bends else ()
-        chain = [first, *(_Vertex(None, layer) for layer in between), last]
-        if first is not last:
+    chains = []
+    for first, last in ends:
+        between = range(graph.layer[first] + 1, graph.layer[last]) if bends else ()
+        chain = [first, *map(graph.add_bend, between), last]
+        if first != last:
             for one, other in itertools.pairwise(chain):
-                one.after.append(other)
-                other.before.append(one)
+                graph.join(one, other)
         chains.append(chain)
     return chains
 
 
-def _collect(
-    vertices: Mapping[str, _Vertex], chains: Iterable[list[_Vertex]]
-) -> list[list[_Vertex]]:
+def _collect(graph: _Graph, chains: Iterable[list[int]]) -> list[list[int]]:
     """Return the vertices of each layer, in groups, and beside each other by first sight."""
-    count = max((one.layer for one in vertices.values()), default=-1) + 1
-    layers: list[list[_Vertex]] = [[] for _ in range(count)]
-    boxes = [one for one in vertices.values() if one.box is not None]
-    for one in sorted(boxes, key=lambda vertex: vertex.box.group if vertex.box else ""):
-        layers[one.layer].append(one)
+    layers: list[list[int]] = [[] for _ in range(max(graph.layer, default=-1) + 1)]
+    for one in sorted(range(len(graph.boxes)), key=lambda one: graph.boxes[one].group):
+        layers[graph.layer[one]].append(one)
     for chain in chains:
         for bend in chain[1:-1]:
-            layers[bend.layer].append(bend)
+            layers[graph.layer[bend]].append(bend)
     return layers
 
 
-def _order(layers: list[list[_Vertex]]) -> None:
+def _order(graph: _Graph, layers: list[list[int]]) -> None:
     """Order each layer by the mean order of its neighbours, there and back."""
+    order = [0] * len(graph.layer)
     for layer in layers:
-        _number(layer)
-    best, fewest = [list(layer) for layer in layers], _crossings(layers)
+        _number(layer, order)
+    before = [near or [one] for one, near in enumerate(graph.before)]
+    after = [near or [one] for one, near in enumerate(graph.after)]
+    best, fewest = [list(layer) for layer in layers], _crossings(graph, layers, order)
     for sweep in range(_ORDER_SWEEPS):
         if not fewest:
             break
         forth = sweep % 2 == 0
         for layer in layers if forth else reversed(layers):
-            wanted = {}
-            for one in layer:
-                near = one.before if forth else one.after
-                wanted[one] = _mean([other.order for other in near]) if near else one.order
-            layer.sort(key=wanted.__getitem__)
-            _number(layer)
-        found = _crossings(layers)
+            wanted = _means(layer, before if forth else after, order)
+            layer[:] = [layer[at] for at in sorted(range(len(layer)), key=wanted.__getitem__)]
+            _number(layer, order)
+        found = _crossings(graph, layers, order)
         if found < fewest:
             best, fewest = [list(layer) for layer in layers], found
-    for layer, order in zip(layers, best, strict=True):
-        layer[:] = order
-        _number(layer)
+    layers[:] = best
 
 
-def _number(layer: Iterable[_Vertex]) -> None:
+def _number(layer: Iterable[int], order: list[int]) -> None:
     for number, one in enumerate(layer):
-        one.order = float(number)
+        order[one] = number
 
 
-def _mean(values: Sequence[float]) -> float:
-    return values[0] if len(values) == 1 else sum(values) / len(values)
+def _means(
+    layer: Iterable[int], near: Sequence[Sequence[int]], values: Sequence[float]
+) -> list[float]:
+    """Return the mean value of the neighbours of each vertex; bends have one on each side."""
+    return [
+        values[others[0]] if len(others) == 1 else sum([values[at] for at in others]) / len(others)
+        for others in map(near.__getitem__, layer)
+    ]
 
 
-def _crossings(layers: Iterable[list[_Vertex]]) -> int:
+def _crossings(graph: _Graph, layers: Iterable[list[int]], order: Sequence[int]) -> int:
     """Return how often edges cross."""
     total = 0
     for layer in layers:
-        ends: list[float] = []
-        for one in layer:
-            if len(one.after) == 1:  # as all bends
-                ends.append(one.after[0].order)
+        ends: list[int] = []
+        for others in map(graph.after.__getitem__, layer):
+            if len(others) == 1:  # as all bends
+                ends.append(order[others[0]])
             else:
-                ends += sorted([other.order for other in one.after])
+                ends += sorted([order[at] for at in others])
         total += _inversions(ends)
     return total
 
 
-def _inversions(values: Iterable[float]) -> int:
+def _inversions(values: Iterable[int]) -> int:
     """Return how many pairs are in the wrong order."""
     total = 0
-    seen: list[float] = []
+    seen: list[int] = []
     for value in values:
-        position = bisect_right(seen, value)
-        total += len(seen) - position
-        seen.insert(position, value)
+        if not seen or seen[-1] <= value:
+            seen.append(value)
+        else:
+            position = bisect_right(seen, value)
+            total += len(seen) - position
+            seen.insert(position, value)
     return total
 
 
-def _place(layers: list[list[_Vertex]]) -> None:
-    """Move the vertices of each layer towards their neighbours, without changing its order."""
+def _place(graph: _Graph, layers: Sequence[list[int]]) -> list[float]:
+    """Move the vertices of each layer towards their neighbours, without changing its order.
+
+    Returns:
+        The middle of each vertex, from top to bottom.
+    """
+    middles = [0.0] * len(graph.layer)
+    offsets = []
     for layer in layers:
         y = 0.0
         for one in layer:
-            one.y = y + one.height / 2
-            y += one.height + one.gap
+            middles[one] = y + graph.height(one) / 2
+            y += graph.height(one) + graph.gap(one)
+        offsets.append(_offsets(graph, layer))
+    near = list(zip(graph.before, graph.after, strict=True))
+    before = [before or after or [one] for one, (before, after) in enumerate(near)]
+    after = [after or before or [one] for one, (before, after) in enumerate(near)]
+    rows = list(zip(layers, offsets, strict=True))
     for sweep in range(_PLACE_SWEEPS):
         forth = sweep % 2 == 0
-        for layer in layers if forth else reversed(layers):
-            wanted = []
-            for one in layer:
-                near = (one.before if forth else one.after) or one.after or one.before
-                wanted.append(_mean([other.y for other in near]) if near else one.y)
-            _spread(layer, wanted)
+        for layer, distances in rows if forth else reversed(rows):
+            wanted = _means(layer, before if forth else after, middles)
+            for one, middle in zip(layer, _spread(wanted, distances), strict=True):
+                middles[one] = middle
+    return middles
 
 
-def _spread(layer: Sequence[_Vertex], wanted: Sequence[float]) -> None:
+def _offsets(graph: _Graph, layer: Sequence[int]) -> list[float]:
+    """Return how far each vertex of a layer is at least below the first one."""
+    offsets = [0.0] * bool(layer)
+    for before, one in itertools.pairwise(layer):
+        apart = (graph.height(before) + graph.height(one)) / 2
+        offsets.append(offsets[-1] + apart + max(graph.gap(before), graph.gap(one)))
+    return offsets
+
+
+def _spread(wanted: Sequence[float], offsets: Sequence[float]) -> Iterator[float]:
     """Give each vertex the nearest free place to where it is wanted, by least squares.
 
     Vertices that would overlap form a block, whose place is the mean of what its members want.
     """
-    offsets: list[float] = []
-    y = 0.0
-    for number, one in enumerate(layer):
-        if number:
-            before = layer[number - 1]
-            y += (before.height + one.height) / 2 + max(before.gap, one.gap)
-        offsets.append(y)
-    blocks: list[tuple[float, int]] = []  # the sum of wanted places, less offsets, and the count
+    totals: list[float] = []
+    counts: list[int] = []
+    means: list[float] = []
     for want, offset in zip(wanted, offsets, strict=True):
-        total, count = want - offset, 1
-        while blocks and blocks[-1][0] / blocks[-1][1] >= total / count:
-            before_total, before_count = blocks.pop()
-            total, count = total + before_total, count + before_count
-        blocks.append((total, count))
-    number = 0
-    for total, count in blocks:
-        for _ in range(count):
-            layer[number].y = total / count + offsets[number]
-            number += 1
+        total = mean = want - offset
+        count = 1
+        while means and means[-1] >= mean:
+            means.pop()
+            total += totals.pop()
+            count += counts.pop()
+            mean = total / count
+        totals.append(total)
+        counts.append(count)
+        means.append(mean)
+    starts = itertools.chain.from_iterable(map(itertools.repeat, means, counts))
+    return map(operator.add, starts, offsets)
 
 
 def _measure(
     picture: Picture,
-    vertices: Mapping[str, _Vertex],
-    chains: Sequence[list[_Vertex]],
-    layers: Sequence[list[_Vertex]],
-    forward: Sequence[tuple[str, str]],
+    graph: _Graph,
+    chains: Sequence[list[int]],
+    layers: Sequence[list[int]],
+    middles: Sequence[float],
     gap: float,
 ) -> Layout:
     """Return places and paths in numbers that begin at a margin."""
-    top = min((one.y - one.height / 2 for layer in layers for one in layer), default=0.0)
-    bottom = max((one.y + one.height / 2 for layer in layers for one in layer), default=0.0)
+    heights = [*map(graph.height, range(len(middles)))]
+    top = min((y - height / 2 for y, height in zip(middles, heights, strict=True)), default=0.0)
+    bottom = max((y + height / 2 for y, height in zip(middles, heights, strict=True)), default=0.0)
     lefts, widths, x = [], [], _MARGIN
     for layer in layers:
-        width = max((one.width for one in layer), default=0.0)
+        boxes = (one for one in layer if one < len(graph.boxes))
+        width = max((graph.widths[one] for one in boxes), default=0.0)
         lefts.append(x)
         widths.append(width)
         x += width + gap
     shift = _MARGIN - top
     places: dict[str, Place] = {}
-    for box in picture.boxes:
-        one = vertices[box.key]
-        left = lefts[one.layer] + (widths[one.layer] - one.width) / 2
-        y = one.y - one.height / 2 + shift
-        places[box.key] = Place(box, left, y, one.width, one.height)
+    for one, box in enumerate(graph.boxes):
+        at, width, height = graph.layer[one], graph.widths[one], graph.heights[one]
+        left = lefts[at] + (widths[at] - width) / 2
+        places[box.key] = Place(box, left, middles[one] - height / 2 + shift, width, height)
+    columns = [(left, left + width) for left, width in zip(lefts, widths, strict=True)]
     paths = []
-    for chain, arrow, (start, _) in zip(chains, picture.arrows, forward, strict=True):
-        turned = start != arrow.start
+    for chain, arrow in zip(chains, picture.arrows, strict=True):
+        first, last = (places[graph.boxes[one].key] for one in (chain[0], chain[-1]))
+        turned = first.box.key != arrow.start
         # An arrow back is a little lower than one there, which may have the same ends.
-        path = _path(chain, places, lefts, widths, shift + _TURNED_SHIFT * turned)
+        lower = shift + _TURNED_SHIFT * turned
+        bends = [(*columns[graph.layer[one]], middles[one] + lower) for one in chain[1:-1]]
+        path = _path(first, last, bends, _TURNED_SHIFT * turned)
         paths.append(path[::-1] if turned else path)
     width = max(x - gap + _MARGIN, 2 * _MARGIN)
     return Layout(places, paths, width, bottom - top + 2 * _MARGIN)
 
 
 def _path(
-    chain: Sequence[_Vertex],
-    places: Mapping[str, Place],
-    lefts: Sequence[float],
-    widths: Sequence[float],
-    shift: float,
+    first: Place, last: Place, bends: Iterable[tuple[float, float, float]], lower: float
 ) -> list[tuple[float, float]]:
-    first, last = chain[0], chain[-1]
-    assert first.box is not None and last.box is not None  # noqa: S101, PT018  # ends are boxes
-    start, end = places[first.box.key], places[last.box.key]
+    """Return the points of an arrow, which is level in the layers that it passes.
+
+    Args:
+        first: The box that it leaves.
+        last: The box that it reaches.
+        bends: Left and right side of each layer between them, and where it passes.
+        lower: How far below the middle of the boxes it begins and ends.
+    """
     if first is last:  # a loop above the box
-        right, up = start.x + start.width / 2, start.y
+        right, up = first.x + first.width / 2, first.y
         return [(right + 12, up), (right + 12, up - 14), (right - 12, up - 14), (right - 12, up)]
-    points = [(start.x + start.width, first.y + shift)]
-    for bend in chain[1:-1]:
-        y = bend.y + shift
-        points += [(lefts[bend.layer], y), (lefts[bend.layer] + widths[bend.layer], y)]
-    return [*points, (end.x, last.y + shift)]
+    points = [(first.x + first.width, first.y + first.height / 2 + lower)]
+    for left, right, y in bends:
+        points += [(left, y), (right, y)]
+    return [*points, (last.x, last.y + last.height / 2 + lower)]
