@@ -92,8 +92,8 @@ class Program:
         run: Callable[[], None] = thread.run
 
         def run_within() -> None:
-            with within(self):
-                run()
+            _local.program = self  # to the end, so that `threading.excepthook` finds it
+            run()
 
         thread.run = run_within  # type: ignore[method-assign]
         self.threads.add(thread)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import builtins
 import ctypes
+import faulthandler
 import io
 import sys
 import threading
@@ -101,6 +102,8 @@ class Container:
             The exit code: that of the first program that failed, or 0.
         """
         threading.excepthook = self._report_thread
+        # A crash in C ends all nodes: the stack of its thread tells which one was at fault.
+        faulthandler.enable(all_threads=False)
         sys.stdout = _WholeLines(sys.stdout)
         for spec in self._specs:
             thread = threading.Thread(
@@ -173,7 +176,8 @@ class Container:
         if script is not None:
             script.report(error)
         elif not isinstance(error, RoszError):
-            sys.__excepthook__(type(error), error, error.__traceback__)
+            # It cannot be compiled: a traceback would show nothing of it.
+            sys.__excepthook__(type(error), error.with_traceback(None), None)
         return 1, f"{type(error).__name__}: {error}"
 
     def _report_end(self, spec: ProgramSpec, code: int, problem: str) -> None:

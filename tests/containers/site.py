@@ -57,6 +57,16 @@ SCRIPTS = {
         while True:
             time.sleep(0.05)
     """,
+    "wrong.py": "def f(:\n",
+    "fatal.py": """
+        import ctypes, threading, rosz
+        def fail():
+            raise ValueError("broken in a thread")
+        thread = threading.Thread(target=fail)
+        thread.start()
+        thread.join()
+        ctypes.string_at(0)
+    """,
     "compiled": "#!/bin/sh\necho no Python; exec sleep 600\n",
 }
 

@@ -23,6 +23,7 @@ BOX = """
       <node pkg="pk" type="native.py" name="n1"/>
       <node pkg="pk" type="talker.py" name="t2"/>
       <node pkg="pk" type="crasher.py" name="c1" respawn="true" respawn_delay="1"/>
+      <node pkg="pk" type="wrong.py" name="w1"/>
       <node pkg="pk" type="compiled" name="alone"/>
       <node pkg="pk" type="gone.py" name="gone"/>
     </group>
@@ -85,6 +86,8 @@ def test_a_crash_names_the_node_and_it_starts_again(box: Program) -> None:
                    " ValueError: broken on purpose"), times=2,
     )  # fmt: skip
     box.wait_for("[/c1] restarting in container '/box'")
+    box.wait_for(re.compile("node '/w1' .*wrong.py.* has died, exit code 1: SyntaxError"))
+    assert "in _run_once" not in box.output
 
 
 def test_the_status_shows_the_members(site: Site, box: Program) -> None:
@@ -146,6 +149,14 @@ def test_programs_that_never_ask_for_the_shutdown_are_interrupted(site: Site) ->
     assert pair.exit_code() == 0
     assert "end of /native" in pair.output
     assert "Traceback" not in pair.output
+
+
+def test_crashes_of_threads_and_in_c_name_the_program(site: Site) -> None:
+    pair = site.rosz("run", "--with", "pk native.py", "pk", "fatal.py")
+    assert pair.exit_code() == -signal.SIGSEGV
+    assert "ERROR: a thread of node 'pk/fatal.py' of container" in pair.output
+    assert "has died: ValueError: broken in a thread" in pair.output
+    assert re.search(r'Segmentation fault\n(.*\n)*  File ".*fatal.py", line \d+', pair.output)
 
 
 def test_modules_of_one_name_beside_two_scripts_are_refused(site: Site) -> None:
