@@ -44,6 +44,7 @@ _TOPICS = dict.fromkeys(
 ) | {
     "Camera": "Image Topic",
     "Image": "Image Topic",
+    "InteractiveMarkers": "Update Topic",
     "Marker": "Marker Topic",
     "MarkerArray": "Marker Topic",
     "OverlayImage": _TOPIC,

@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from network import TIMEOUT, Network
 
+from rosz.msgs.geometry_msgs.msg import Pose, Quaternion, Vector3
+from rosz.msgs.std_msgs.msg import ColorRGBA, Header
+from rosz.msgs.visualization_msgs.msg import (
+    InteractiveMarker,
+    InteractiveMarkerControl,
+    InteractiveMarkerFeedback,
+    InteractiveMarkerInit,
+    InteractiveMarkerUpdate,
+    Marker,
+)
+
 from .robot import LONG, SPACE, THEMES, World, eventually, open_browser, set_screen, take_picture
 
 pytestmark = [pytest.mark.system]
 
 _SHOW = "show=grid,tf,robot,/map,/cloud,/scan;color=%23ff3030,/markers,/path;color=%231f9d61"
+_RED = ColorRGBA(0.8, 0.2, 0.2, 1.0)
 _PICTURE = (
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGNIMPgAAAJ0AYFMZMHJAAAAAElFTkSuQmCC"
 )
@@ -170,4 +183,56 @@ root.traverse((one) => {
 return found;
 """
     eventually(lambda: world.ask(size) == [1], "the texture of the box")
+    assert world.messages() == []
+
+
+def test_a_handle_is_turned_and_pressed(world: World) -> None:
+    from selenium.webdriver import ActionChains
+
+    server = world.network.node("handles")
+    got: list[Any] = []
+    server.subscription("h/feedback", InteractiveMarkerFeedback, got.append)
+    server.publisher("h/update", InteractiveMarkerUpdate)
+    flat, up = Quaternion(0, 0, 0, 1), Quaternion(0, math.sqrt(0.5), 0, math.sqrt(0.5))
+    turn = InteractiveMarkerControl("turn", up, interaction_mode=5)
+    press = InteractiveMarkerControl("press", flat, interaction_mode=2)
+    press.markers = [Marker(type=Marker.CUBE, scale=Vector3(1.6, 1.6, 0.1), color=_RED)]
+    wheel = InteractiveMarker(header=Header(frame_id="map"), pose=Pose(orientation=flat))
+    wheel.name, wheel.scale, wheel.controls = "wheel", 4.0, [turn, press]
+    full = server.publisher("h/update_full", InteractiveMarkerInit, latch=True)
+    full.publish(InteractiveMarkerInit("s", 1, [wheel]))
+    set_screen(world.browser, "laptop", "light")
+    world.open("/3d?frame=map&show=/h/update&view=top")
+    world.should_see("wheel")
+    ready = """
+const view = getElement(Number(document.querySelector('.rosz-scene').id.slice(1)));
+let count = 0;
+view.scene.traverse((one) => { count += one.handle ? 1 : 0; });
+if (count < 2 || view.camera.position.z < 11.9) return null;
+const at = view.camera.position.clone().set(2.3, 0, 0).project(view.camera);
+return Math.round(at.x * view.renderer.domElement.getBoundingClientRect().width / 2);
+"""
+    eventually(lambda: world.ask(ready), "the handles, from above")
+    aside = world.ask(ready)
+    canvas = world.browser.find_element("css selector", ".rosz-scene canvas")
+
+    def turned() -> bool:
+        keys: Any = ActionChains(world.browser, duration=50)
+        keys.move_to_element_with_offset(canvas, aside, 0).click_and_hold()
+        keys.move_by_offset(-aside // 4, -aside // 2).move_by_offset(-aside // 4, 0)
+        keys.release().perform()
+        return any(one.event_type == one.MOUSE_UP for one in got)
+
+    eventually(turned, "a turn that arrives")
+    last = next(one for one in reversed(got) if one.event_type == one.POSE_UPDATE)
+    assert (last.marker_name, last.control_name) == ("wheel", "turn")
+    assert last.pose.position.x == pytest.approx(0.0, abs=1e-6)
+    assert 0.1 < last.pose.orientation.z < 0.9
+    assert last.pose.orientation.x == pytest.approx(0.0, abs=1e-6)
+
+    def pressed() -> bool:
+        ActionChains(world.browser).move_to_element(canvas).click().perform()
+        return any(one.event_type == one.BUTTON_CLICK for one in got)
+
+    eventually(pressed, "a click that arrives")
     assert world.messages() == []

@@ -40,7 +40,7 @@ Visualization Manager:
            Color Transformer: FlatColor, Enabled: true}
         - {Class: rviz/PointCloud2, Name: Cloud, Topic: cloud, Color Transformer: AxisColor}
         - {Class: rviz/Camera, Name: Camera, Image Topic: /image, Color: 1; 2; 3}
-        - {Class: rviz/InteractiveMarkers, Name: Handles, Update Topic: /handles}
+        - {Class: rviz/InteractiveMarkers, Name: Handles, Update Topic: /handles/update}
         - {Class: rviz/Odometry, Name: Odometry, Topic: /odom, Keep: 30}
         - {Class: rviz/Pose, Name: Bad, Topic: /a b}
         - {Class: rviz/RobotModel, Name: Second, Robot Description: two, TF Prefix: tb3_1}
@@ -153,6 +153,7 @@ def test_a_file_of_rviz_is_a_setup(tmp_path: Path) -> None:
             Look("/scan", "#ff0000", 5),
             Look("/cloud", "height"),
             Look("/image"),
+            Look("/handles/update"),
             Look("/odom", keep=30),
             Look("robot:/two", prefix="tb3_1"),
             Look("/markers"),
@@ -161,14 +162,13 @@ def test_a_file_of_rviz_is_a_setup(tmp_path: Path) -> None:
         ),
         "top",
     )
-    assert left_out[:4] == [
+    assert left_out[:3] == [
         "Planning (moveit_rviz_plugin/MotionPlanning): only the robot is shown",
         "Nothing (rviz/Image): it names no topic",
         "Camera (rviz/Camera): the image is beside the view, and things in space are not drawn"
         " over it",
-        "Handles (rviz/InteractiveMarkers): there is no such display here",
     ]
-    assert left_out[4].startswith("Bad (rviz/Pose): ")
+    assert left_out[3].startswith("Bad (rviz/Pose): ")
     looks = {one.name for one in read_rviz(file, full)[0].looks}
     assert {"/base_scan", "/ns/cloud", "robot:/ns/robot_description", "/image"} <= looks
     page, notes = page_of("rviz", ["-d", str(file), "-f", "map"], plain)

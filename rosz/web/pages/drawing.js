@@ -76,7 +76,12 @@ export default class Drawing {
     };
     const old = [...this.mesh.children];
     this.known = new Map(old.filter((one) => one.label).map((one) => [one.label, one]));
-    const added = parts.map((part) => this[part.kind](part, take));
+    const added = parts.map((part) => {
+      const object = this[part.kind](part, take);
+      object.handle = part.handle; // handles.js moves it
+      if (object.element) object.element.handle = part.handle;
+      return object;
+    });
     for (const one of old) {
       if (added.includes(one)) continue;
       if (one.own) {
@@ -133,7 +138,7 @@ export default class Drawing {
   }
 
   text(part) {
-    const name = JSON.stringify([part.text, part.color, part.height]);
+    const name = JSON.stringify([part.text, part.color, part.height, part.handle?.control]);
     const known = this.known.get(name); // a new one would flicker
     if (known) {
       this.known.delete(name);
@@ -144,6 +149,7 @@ export default class Drawing {
     label.textContent = part.text;
     label.className = "rosz-label";
     if (part.color) label.style.color = part.color;
+    if (part.handle) label.style.pointerEvents = "auto";
     const found = new CSS2DObject(label);
     found.label = name;
     found.position.set(...part.at);

@@ -12,12 +12,15 @@ from nicegui.elements.scene.scene_object3d import Object3D
 
 from rosz.errors import RoszError
 from rosz.web.model import IMAGE_TYPES, Frames, System
+from rosz.web.pages.handling import Handling
 from rosz.web.pages.layout import Frame, address_of
 from rosz.web.pages.pointing import Pointing
 from rosz.web.scene import (
     AXES,
     GRID,
+    HANDLE_TYPE,
     Display,
+    HandleDisplay,
     Look,
     Meshes,
     Setup,
@@ -40,7 +43,7 @@ _CHOICES = {
     "sensor_msgs/PointCloud2": _CLOUDS,
 }
 """The meanings that the color of a display can have, by its type."""
-_MARKERS = ("Robot", "visualization_msgs/Marker", "visualization_msgs/MarkerArray")
+_MARKERS = ("Robot", "visualization_msgs/Marker", "visualization_msgs/MarkerArray", HANDLE_TYPE)
 _OWN_COLORS = frozenset({"Axes", "Frames", "nav_msgs/OccupancyGrid", *_MARKERS, *IMAGE_TYPES})
 _OWN_SIZES = _OWN_COLORS - {"Axes", "Frames"} | {"nav_msgs/GridCells", "sensor_msgs/Range"}
 _NEED_COLOR = frozenset(
@@ -135,6 +138,7 @@ class _ScenePage:
                     _Backdrop()
                 self._list = ui.column().classes("w-full gap-2 min-w-0")
         self._pointing.add_pointer(self._scene)
+        Handling(self._scene, self._handles)
         frame.keep(self)
         frame.keep(self._pointing)
         for look in setup.looks:
@@ -204,6 +208,11 @@ class _ScenePage:
         kind = list_displays(self._graph.survey()).get(name, "")
         self._show(Look(name, color if kind in _NEED_COLOR else ""))
         self._changed()
+
+    def _handles(self, name: str) -> HandleDisplay | None:
+        """Return the display of interactive markers with a name; None if there is none."""
+        found = (one.display for one in self._shown if one.look.name == name)
+        return next((one for one in found if isinstance(one, HandleDisplay)), None)
 
     # The address of the page.
 

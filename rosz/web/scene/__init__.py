@@ -5,6 +5,7 @@ fixed frame when a browser asks for it. Needs numpy.
 """
 
 from rosz.web.scene.display import Display
+from rosz.web.scene.handles import HANDLE_TYPE, HandleDisplay, Held
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.opening import list_displays, open_display
 from rosz.web.scene.setup import (
@@ -26,10 +27,13 @@ __all__ = (
     "DEFAULT",
     "DESCRIPTION",
     "GRID",
+    "HANDLE_TYPE",
     "ROBOT",
     "TF",
     "TOOLS",
     "Display",
+    "HandleDisplay",
+    "Held",
     "Look",
     "Meshes",
     "Setup",

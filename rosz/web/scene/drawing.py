@@ -39,9 +39,14 @@ class Drawing:
     """Points, lines, triangles, shapes, texts, meshes and images of one display.
 
     Colors are arrays of bytes, red, green, blue and opacity: one for all, or one for each.
+
+    Attributes:
+        handle: What one can do with the parts that are drawn next, for the browser; None for
+            nothing.
     """
 
     def __init__(self) -> None:
+        self.handle: dict[str, object] | None = None
         self._header: list[dict[str, Any]] = []
         self._data: list[bytes] = []
 
@@ -49,6 +54,9 @@ class Drawing:
     def empty(self) -> bool:
         """Whether nothing is drawn."""
         return not self._header
+
+    def _add(self, head: dict[str, Any]) -> None:
+        self._header.append(head if self.handle is None else {**head, "handle": self.handle})
 
     def points(self, positions: Array, colors: Array, size: float, *, pixels: bool = False) -> None:
         """Draw points.
@@ -74,9 +82,7 @@ class Drawing:
         if not len(rows):
             return
         paint = _painted(colors, len(rows))
-        self._header.append(
-            {**head, "count": len(rows), "clear": bool(paint[:, 3].min() < _OPAQUE)}
-        )
+        self._add({**head, "count": len(rows), "clear": bool(paint[:, 3].min() < _OPAQUE)})
         self._data += [rows.tobytes(), paint.tobytes()]
 
     def shapes(self, shape: Shape, matrices: Array, colors: Array, texture: str = "") -> None:
@@ -96,7 +102,7 @@ class Drawing:
             chosen = paint[:, 3] == opacity
             columns = np.ascontiguousarray(rows[chosen].transpose(0, 2, 1))
             head = {"kind": "shapes", "shape": shape, "opacity": int(opacity) / _OPAQUE}
-            self._header.append({**head, "count": len(columns), "texture": texture})
+            self._add({**head, "count": len(columns), "texture": texture})
             self._data += [columns.tobytes(), np.ascontiguousarray(paint[chosen]).tobytes()]
 
     def text(
@@ -111,9 +117,7 @@ class Drawing:
             height: Height in metres; 0 for the same size at any distance.
         """
         at = [float(value) for value in position]
-        self._header.append(
-            {"kind": "text", "text": text, "at": at, "color": color, "height": height}
-        )
+        self._add({"kind": "text", "text": text, "at": at, "color": color, "height": height})
 
     def mesh(
         self,
@@ -135,7 +139,7 @@ class Drawing:
         columns = [float(value) for value in np.asarray(matrix).T.reshape(-1)]
         paint = None if color is None else [int(value) for value in color]
         head = {"kind": "model", "url": address, "form": form, "texture": texture}
-        self._header.append({**head, "matrix": columns, "color": paint})
+        self._add({**head, "matrix": columns, "color": paint})
 
     def image(self, cells: Array, matrix: Array, palette: Array) -> None:
         """Draw cells on the plane z = 0, from its origin to (1, 1) of a matrix.
@@ -148,7 +152,7 @@ class Drawing:
         rows = np.ascontiguousarray(cells, dtype=np.uint8)
         height, width = rows.shape
         columns = [float(value) for value in np.asarray(matrix).T.reshape(-1)]
-        self._header.append({"kind": "image", "width": width, "height": height, "matrix": columns})
+        self._add({"kind": "image", "width": width, "height": height, "matrix": columns})
         self._data += [np.ascontiguousarray(palette, dtype=np.uint8).tobytes(), rows.tobytes()]
 
     def encode(self) -> bytes:

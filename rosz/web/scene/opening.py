@@ -16,6 +16,7 @@ from rosz.web.scene.display import (
     ImageDisplay,
     TopicDisplay,
 )
+from rosz.web.scene.handles import FEEDBACK, HANDLE_TYPE, HandleDisplay
 from rosz.web.scene.maps import MAP_TYPE, UPDATES, MapDisplay
 from rosz.web.scene.markers import MARKER_TYPES, MarkerDisplay
 from rosz.web.scene.meshes import Meshes
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ("list_displays", "open_display")
 
-_TYPES = DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES | {MAP_TYPE}
+_TYPES = DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES | {HANDLE_TYPE, MAP_TYPE}
 
 
 def list_displays(survey: Survey) -> dict[str, str]:
@@ -84,6 +85,10 @@ def _open_topic(
         raise NotFoundError(f"topic '{name}' does not exist yet")
     if types[0] in MARKER_TYPES:
         return MarkerDisplay(node, survey, look, frames, meshes)
+    if types[0] == HANDLE_TYPE:
+        feedback = f"{name.rpartition('/')[0]}/{FEEDBACK}"
+        objection = system.permission.objection("publish", feedback)
+        return HandleDisplay(node, survey, look, frames, meshes, objection)
     if types[0] == MAP_TYPE:
         unseen = system.permission.objection("subscribe", name + UPDATES)
         return MapDisplay(node, survey, look, frames, unseen)
