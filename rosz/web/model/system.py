@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,6 +78,7 @@ class System:
         pictures: The sources of pictures.
         actions: The goals that pages have sent.
         bags: The bags of the folder, a recording, and one that plays.
+        drawing: Held while a graph is drawn: pages that show the same share its layout.
     """
 
     def __init__(self, node: Node, permission: Permission, bags: Path | None = None) -> None:
@@ -88,6 +90,7 @@ class System:
         self.frames: Shared[Frames] = Shared(lambda: Frames(node, permission))
         self.launches: Shared[Launches] = Shared(lambda: Launches(node, permission))
         self.pictures = Pictures()
+        self.drawing = asyncio.Lock()
         self.actions: Actions = node.keep(Actions(node, permission))
         self.bags: Bags = node.keep(Bags(bags or Path(), permission))
         self.console: Shared[LogBook] = Shared(lambda: LogBook(node))

@@ -252,6 +252,8 @@ class _Graph:
 
     def _refresh(self) -> None:
         """Draw what has changed; the rates on the arrows change once a second."""
+        if self._drawn is not None and not self._frame.connected:
+            return  # a browser that went elsewhere, or that comes back
         survey, now = self._watch.survey(), time.monotonic()
         if not self._described and self._watch.complete:
             with self._frame.content:
@@ -287,7 +289,8 @@ class _Graph:
         try:
             while (shown := self._shown) is not self._drawn and shown is not None:
                 flows = self._flows()
-                text = await run.io_bound(write_svg, shown.picture, flows, shown.chosen)
+                async with self._system.drawing:
+                    text = await run.io_bound(write_svg, shown.picture, flows, shown.chosen)
                 if text is None or self._drawing.is_deleted:
                     return
                 self._labels = dict(enumerate(labels_of(shown.picture, flows)))

@@ -238,6 +238,11 @@ class Frame:
         """Whether the browser has left the page."""
         return self._client.is_deleted
 
+    @property
+    def connected(self) -> bool:
+        """Whether the browser has a link to the page, which it may lose for some seconds."""
+        return self._client.has_socket_connection
+
     def _close(self) -> None:
         uses, self._uses = self._uses, []
         for use in reversed(uses):

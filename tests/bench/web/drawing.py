@@ -21,7 +21,18 @@ const paint = performance.getEntriesByType('paint')
   .find((one) => one.name === 'first-contentful-paint');
 return paint ? (performance.timeOrigin + paint.startTime) / 1000 : null;
 """
-_BOXES = "return document.querySelectorAll('.rosz-graph [data-key]').length"
+# Waits in the browser: one that is asked all the time has none left to draw.
+_BOXES = """
+const [count, done] = arguments;
+const look = () => document.querySelectorAll('.rosz-graph [data-key]').length === count;
+const paint = () => requestAnimationFrame(() => setTimeout(() => done(true)));
+if (look()) return paint();
+new MutationObserver((_, observer) => {
+  if (!look()) return;
+  observer.disconnect();
+  paint();
+}).observe(document, {childList: true, subtree: true});
+"""
 _NEWEST = """
 const chart = Object.values(mounted_app.$refs).find((one) => one && one.chart)?.chart;
 const newest = chart ? chart.getOption().series.map((one) => one.data.at(-1)?.at(-1) ?? 0) : [];
@@ -113,7 +124,9 @@ def graph(rounds: int) -> list[Figure]:
 
 
 def _wait_for_boxes(browser: Any, count: int) -> None:
-    eventually(lambda: browser.execute_script(_BOXES) == count, f"{count} boxes", TIMEOUT)
+    """Wait until the graph has boxes, and is painted."""
+    browser.set_script_timeout(TIMEOUT)
+    browser.execute_async_script(_BOXES, count)
 
 
 def plot(rounds: int) -> list[Figure]:
