@@ -205,6 +205,7 @@ def closed(function):
         return str(error)
 result = [
     Same is Bag,
+    [type(one).__name__ for one in (info, info.topics["/tf"], bag.get_compression_info())],
     [(topic, m._md5sum if topic in ("/info", "/marker") else str(m), t.to_nsec())
         for topic, m, t in bag.read_messages()],
     [(list(m.K), list(m.D)) for _, m, _ in bag.read_messages("/info")],

@@ -63,19 +63,19 @@ BagMessageWithConnectionHeader = namedtuple(  # noqa: PYI024  # as in ROS 1
 _COMPRESSIONS = (Compression.NONE, Compression.BZ2, Compression.LZ4)
 
 
-class _TopicTuple(NamedTuple):
+class TopicTuple(NamedTuple):
     msg_type: str
     message_count: int
     connections: int
     frequency: float | None
 
 
-class _TypesAndTopicsTuple(NamedTuple):
+class TypesAndTopicsTuple(NamedTuple):
     msg_types: dict[str, str]
-    topics: dict[str, _TopicTuple]
+    topics: dict[str, TopicTuple]
 
 
-class _CompressionTuple(NamedTuple):
+class CompressionTuple(NamedTuple):
     compression: str
     uncompressed: int
     compressed: int
@@ -385,7 +385,7 @@ class Bag:
                 raise ROSBagException("Bag contains no message")
             return Time(*divmod(getattr(reader, name), 1_000_000_000)).to_sec()
 
-    def get_type_and_topic_info(self, topic_filters: Any = None) -> _TypesAndTopicsTuple:
+    def get_type_and_topic_info(self, topic_filters: Any = None) -> TypesAndTopicsTuple:
         """Return the types with their MD5 sums, and what is known of the topics.
 
         Args:
@@ -395,20 +395,20 @@ class Bag:
             summary = summarize("", reader, frequencies=not self._skip_index)
         names = [topic_filters] if isinstance(topic_filters, str) else topic_filters
         topics = {
-            one.topic: _TopicTuple(one.type, one.messages, one.connections, one.frequency)
+            one.topic: TopicTuple(one.type, one.messages, one.connections, one.frequency)
             for one in summary.topics
             if names is None or one.topic in names
         }
-        return _TypesAndTopicsTuple(summary.types, topics)
+        return TypesAndTopicsTuple(summary.types, topics)
 
-    def get_compression_info(self) -> _CompressionTuple:
+    def get_compression_info(self) -> CompressionTuple:
         """Return the most frequent compression, and the sizes without and with it."""
         with self._view() as reader:
             found = summarize("", reader).compressions
         if not found:
-            return _CompressionTuple(self._compression, 0, 0)
+            return CompressionTuple(self._compression, 0, 0)
         sizes = sum(one.uncompressed for one in found), sum(one.size for one in found)
-        return _CompressionTuple(found[0].name, *sizes)
+        return CompressionTuple(found[0].name, *sizes)
 
     def __str__(self) -> str:
         with self._view() as reader:
