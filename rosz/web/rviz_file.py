@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from rosz.errors import RoszError, UsageError
-from rosz.web.scene import AXES, DESCRIPTION, GRID, ROBOT, TF, Look, Setup
+from rosz.web.scene import AXES, DEPTH, DESCRIPTION, GRID, ROBOT, TF, Look, Setup
 
 __all__ = ("read_rviz",)
 
@@ -43,6 +43,7 @@ _TOPICS = dict.fromkeys(
     _TOPIC,
 ) | {
     "Camera": "Image Topic",
+    "DepthCloud": "Depth Map Topic",
     "Image": "Image Topic",
     "InteractiveMarkers": "Update Topic",
     "Marker": "Marker Topic",
@@ -160,7 +161,10 @@ def _look(display: dict[str, Any], kind: str, resolve: Callable[[str], str]) -> 
         topic = topic.get("Value", "")
     if kind not in _TOPICS or not topic:
         return None
-    return _look_at_topic(display, kind, resolve(str(topic)), visible=visible)
+    image = str(display.get("Color Image Topic") or "")
+    if kind == "DepthCloud" and image:
+        image = resolve(image)
+    return _look_at_topic(display, kind, resolve(str(topic)), image, visible=visible)
 
 
 def _frame(display: dict[str, Any]) -> str:
@@ -169,7 +173,11 @@ def _frame(display: dict[str, Any]) -> str:
     return "" if frame.startswith("<") else frame
 
 
-def _look_at_topic(display: dict[str, Any], kind: str, name: str, *, visible: bool) -> Look:
+def _look_at_topic(
+    display: dict[str, Any], kind: str, name: str, image: str, *, visible: bool
+) -> Look:
+    if kind == "DepthCloud":
+        return Look(f"{DEPTH}:{name}", visible=visible, image=image)
     color, size = _color(display.get("Color")), 0.0
     if kind in _CLOUDS:
         color = _COLORS.get(str(display.get("Color Transformer", "")), color)

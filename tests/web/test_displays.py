@@ -9,7 +9,8 @@ import pytest
 from network import Network, eventually
 
 from rosz.environment import Environment
-from rosz.errors import UsageError
+from rosz.errors import NotFoundError, UsageError
+from rosz.introspect.subscribe import topic_types
 from rosz.msgs.geometry_msgs.msg import (
     Accel,
     AccelStamped,
@@ -31,8 +32,17 @@ from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, Imu
 from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY
 from rosz.web.model import Frames, Permission, System
-from rosz.web.scene import Look, Meshes, Setup, format_setup, open_display, read_setup
+from rosz.web.scene import (
+    Look,
+    Meshes,
+    Setup,
+    format_setup,
+    list_displays,
+    open_display,
+    read_setup,
+)
 from rosz.web.scene.cameras import draw_camera
+from rosz.web.scene.depth import draw_depth
 from rosz.web.scene.detections import draw_boxes, draw_polygons
 from rosz.web.scene.display import FrameDisplay
 from rosz.web.scene.drawing import Drawing
@@ -196,5 +206,71 @@ def test_a_robot_with_a_prefix_has_other_frames(network: Network) -> None:
     display.refresh("tb3_0/base")
     assert parts(display.encoded()[0]) == []
     assert "no transform to 'tb3_0/base'" in display.fault
+    display.close()
+    frames.close()
+
+
+def test_a_depth_image_is_points() -> None:
+    info = CameraInfo(height=2, width=2, k=[100.0, 0, 1, 0, 100.0, 0, 0, 0, 1])
+    near = np.array([[1000, 0], [2000, 3000]], "<u2")
+    depth = Image(height=2, width=2, encoding="16UC1", step=4, data=near.tobytes())
+    drawing = Drawing()
+    text = draw_depth(depth, info, None, ASIDE, Look("/d", "#ff0000"), drawing)
+    assert text == "3 of 2 x 2 points"
+    (points,) = parts(drawing)
+    assert np.allclose(points["positions"], [(10.01, 0, 1), (10.02, -0.02, 2), (10, -0.03, 3)])
+    far = np.array([[1, np.nan, 9], [np.inf, 0, 9]], ">f4")  # with an end of lines
+    depth = Image(height=2, width=2, encoding="32FC1", step=12, data=far.tobytes(), is_bigendian=1)
+    assert draw_depth(depth, info, None, IDENTITY, Look("/d"), Drawing()) == "1 of 2 x 2 points"
+    for broken, why in (
+        (Image(height=1, width=1, encoding="rgb8", step=3, data=bytes(3)), "expected a depth"),
+        (Image(height=1, width=1, encoding="32FC1", step=4, data=bytes(3)), "expected 4"),
+        (Image(height=1, width=1, encoding="32FC1", step=2, data=bytes(4)), "4 bytes of data"),
+    ):
+        with pytest.raises(UsageError, match=why):
+            draw_depth(broken, info, None, IDENTITY, Look("/d"), Drawing())
+    with pytest.raises(UsageError, match="not calibrated"):
+        draw_depth(depth, CameraInfo(), None, IDENTITY, Look("/d"), Drawing())
+
+
+def test_points_of_depths_have_the_colors_of_an_image(network: Network) -> None:
+    pytest.importorskip("cv2")
+    robot, page = network.node("robot"), network.node("page")
+    depths = robot.publisher("camera/depth", Image, latch=True)
+    infos = robot.publisher("camera/camera_info", CameraInfo, latch=True)
+    colors = robot.publisher("rgb", Image, latch=True)
+    k = [100.0, 0, 1, 0, 100.0, 0, 0, 0, 1]
+    infos.publish(CameraInfo(height=1, width=2, k=k))
+    one = np.ones(2, "<f4").tobytes()
+    header = Header(frame_id="camera")
+    depths.publish(Image(header, height=1, width=2, encoding="32FC1", step=8, data=one))
+    picture = bytes((255, 0, 0, 0, 0, 255)) * 2
+    colors.publish(Image(height=1, width=4, encoding="rgb8", step=12, data=picture))
+    system = System(page, Permission())
+    graph = system.graph.use().value
+    names = {"/camera/depth", "/camera/camera_info", "/rgb"}
+    eventually(lambda: names <= set(topic_types(graph.survey().view)), "the camera")
+    assert "depth:/camera/depth" in list_displays(graph.survey())
+    frames = Frames(page)
+    meshes = Meshes(Environment.read({}), lambda _: "")
+    look = Look("depth:/camera/depth", image="/rgb")
+    display = open_display(system, graph.survey(), frames, meshes, look)
+
+    def drawn() -> list[list[int]]:
+        display.look = Look("depth:/camera/depth", size=display.look.size + 1, image="/rgb")
+        display.refresh("camera")
+        found = parts(display.encoded()[0])
+        paint: list[list[int]] = found[0]["colors"].tolist() if found else []
+        return paint
+
+    eventually(lambda: drawn() == [[255, 0, 0, 255]] * 2, "points in the colors of the image")
+    assert (display.kind, display.status) == ("DepthCloud", "2 of 2 x 1 points")
+    display.look = Look("depth:/camera/depth", visible=False, image="/rgb")
+    display.refresh("camera")
+    publishers = (depths, infos, colors)
+    eventually(lambda: not any(one.subscribers() for one in publishers), "no subscription")
+    look = Look("depth:/camera/depth", image="/none")
+    with pytest.raises(NotFoundError, match="/none"):
+        open_display(system, graph.survey(), frames, meshes, look)
     display.close()
     frames.close()

@@ -41,6 +41,8 @@ Visualization Manager:
         - {Class: rviz/PointCloud2, Name: Cloud, Topic: cloud, Color Transformer: AxisColor}
         - {Class: rviz/Camera, Name: Camera, Image Topic: /image, Color: 1; 2; 3}
         - {Class: rviz/InteractiveMarkers, Name: Handles, Update Topic: /handles/update}
+        - {Class: rviz/DepthCloud, Name: Depth, Depth Map Topic: /camera/depth/image_raw,
+           Color Image Topic: camera/rgb}
         - {Class: rviz/Odometry, Name: Odometry, Topic: /odom, Keep: 30}
         - {Class: rviz/Pose, Name: Bad, Topic: /a b}
         - {Class: rviz/RobotModel, Name: Second, Robot Description: two, TF Prefix: tb3_1}
@@ -154,6 +156,7 @@ def test_a_file_of_rviz_is_a_setup(tmp_path: Path) -> None:
             Look("/cloud", "height"),
             Look("/image"),
             Look("/handles/update"),
+            Look("depth:/camera/depth/image_raw", image="/camera/rgb"),
             Look("/odom", keep=30),
             Look("robot:/two", prefix="tb3_1"),
             Look("/markers"),

@@ -37,6 +37,7 @@ _LIST_PERIOD = 1.0
 _COLORS = ("#e0483e", "#2f6fed", "#1f9d61", "#e0a21a", "#8a4fd0", "#0f9bb0", "#c13c8b")
 _CLOUDS = {"height": "by height", "intensity": "by intensity", "rgb": "their own"}
 _CHOICES = {
+    "DepthCloud": _CLOUDS,
     "nav_msgs/OccupancyGrid": {"costmap": "of a costmap"},
     "sensor_msgs/LaserScan": _CLOUDS,
     "sensor_msgs/PointCloud": _CLOUDS,

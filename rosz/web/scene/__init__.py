@@ -11,6 +11,7 @@ from rosz.web.scene.opening import list_displays, open_display
 from rosz.web.scene.setup import (
     AXES,
     DEFAULT,
+    DEPTH,
     DESCRIPTION,
     GRID,
     ROBOT,
@@ -25,6 +26,7 @@ from rosz.web.scene.tools import TOOLS, Tools
 __all__ = (
     "AXES",
     "DEFAULT",
+    "DEPTH",
     "DESCRIPTION",
     "GRID",
     "HANDLE_TYPE",

@@ -247,6 +247,8 @@ class TopicDisplay:
         survey: The running nodes.
         look: Its settings.
         frames: The frames.
+        topic: Full name of the topic; that of the display by default.
+        draw: Function that draws a message; the one for its type by default.
 
     Raises:
         NotFoundError: The topic does not exist.
@@ -254,8 +256,16 @@ class TopicDisplay:
         DefinitionError: Its definition differs from the one here.
     """
 
-    def __init__(self, node: Node, survey: Survey, look: Look, frames: Frames) -> None:
-        topic = look.name
+    def __init__(
+        self,
+        node: Node,
+        survey: Survey,
+        look: Look,
+        frames: Frames,
+        topic: str = "",
+        draw: _Draw | None = None,
+    ) -> None:
+        self._topic = topic = topic or look.name
         token = find_token(survey.view, topic, topic_types(survey.view).get(topic, ("",))[0])
         cls = find_class(node.context, token)
         self.look = look
@@ -263,7 +273,7 @@ class TopicDisplay:
         self.status: str = ""
         self.fault: str = ""
         self.received: int = 0
-        self._draw = _DRAW[self.kind]
+        self._draw = draw or _DRAW[self.kind]
         self._trail = poses.Trail() if self.kind == "nav_msgs/Odometry" else None
         self._frames = frames
         self._stamped: bool = cls._has_header
@@ -282,7 +292,7 @@ class TopicDisplay:
 
     def _subscribe(self) -> None:
         self._subscription = self._node.subscription(
-            self.look.name, self._cls, self._receive, queue_size=_QUEUE, raw=True
+            self._topic, self._cls, self._receive, queue_size=_QUEUE, raw=True
         )
 
     def _receive(self, payload: bytes) -> None:
@@ -329,8 +339,7 @@ class TopicDisplay:
         if self.look.visible:
             self._subscribe()
             return
-        subscription, self._subscription = self._subscription, None
-        subscription.close()
+        self._unsubscribe()
         with self._lock:
             self._kept.clear()
             if self._trail is not None:
@@ -355,8 +364,11 @@ class TopicDisplay:
                 self.fault = str(error)
         return drawing.encode(), MEDIA
 
-    def close(self) -> None:
-        """Unsubscribe."""
+    def _unsubscribe(self) -> None:
         subscription, self._subscription = self._subscription, None
         if subscription is not None:
             subscription.close()
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._unsubscribe()

@@ -9,6 +9,7 @@ from rosz.introspect.subscribe import topic_types
 from rosz.introspect.topics import list_topics
 from rosz.names import short_type
 from rosz.web.model import IMAGE_TYPES, Frames, System
+from rosz.web.scene.depth import DepthDisplay, info_of
 from rosz.web.scene.display import (
     DRAWN_TYPES,
     Display,
@@ -21,7 +22,7 @@ from rosz.web.scene.maps import MAP_TYPE, UPDATES, MapDisplay
 from rosz.web.scene.markers import MARKER_TYPES, MarkerDisplay
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.robot import RobotDisplay
-from rosz.web.scene.setup import AXES, DESCRIPTION, GRID, ROBOT, TF, Look
+from rosz.web.scene.setup import AXES, DEPTH, DESCRIPTION, GRID, ROBOT, TF, Look
 from rosz.web.scene.still import STILL, StillDisplay
 
 if TYPE_CHECKING:
@@ -41,7 +42,12 @@ def list_displays(survey: Survey) -> dict[str, str]:
         for kind in one.types
         if short_type(kind) in _TYPES
     }
-    return found | dict(sorted(topics.items()))
+    depths = {
+        f"{DEPTH}:{name}": "points of a depth image"
+        for name, kind in topics.items()
+        if kind == "sensor_msgs/Image" and DEPTH in name and info_of(name) in topics
+    }
+    return found | dict(sorted(topics.items())) | dict(sorted(depths.items()))
 
 
 def open_display(
@@ -67,6 +73,11 @@ def open_display(
     if name.partition(":")[0] == ROBOT:
         system.permission.check("get", name.partition(":")[2] or DESCRIPTION)
         return RobotDisplay(node, look, frames, meshes)
+    if name.partition(":")[0] == DEPTH:
+        topic = name.partition(":")[2]
+        for one in filter(None, (topic, info_of(topic), look.image)):
+            system.permission.check("subscribe", one)
+        return DepthDisplay(node, survey, look, frames)
     return _open_topic(system, survey, frames, meshes, look)
 
 

@@ -13,7 +13,7 @@ from rosz.web.scene.colors import BY_HEIGHT, BY_INTENSITY, OWN, color_bytes, rai
 from rosz.web.scene.drawing import Array, Drawing, moved, placed
 from rosz.web.scene.setup import Look
 
-__all__ = ("MOST_POINTS", "draw_cloud", "draw_old_cloud", "draw_range", "draw_scan")
+__all__ = ("MOST_POINTS", "draw_cloud", "draw_old_cloud", "draw_points", "draw_range", "draw_scan")
 
 MOST_POINTS = 500_000
 """Points of a cloud that are drawn; of more, every second one, or every third."""
@@ -29,7 +29,7 @@ def draw_scan(scan: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     points = moved(np.column_stack((x, y, np.zeros_like(x)))[known], pose)
     intensities = np.asarray(scan.intensities, dtype=np.float64)
     values = intensities[known] if len(intensities) == len(ranges) else None
-    _draw(points, values, None, look, drawing)
+    draw_points(points, values, None, look, drawing)
     return f"{len(points)} of {len(ranges)} points"
 
 
@@ -50,7 +50,7 @@ def draw_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     points, rows = moved(points[known], pose), rows[known]
     values = rows["intensity"].astype(np.float64) if "intensity" in fields else None
     own = next((rows[name] for name in ("rgb", "rgba") if name in fields), None)
-    _draw(points, values, None if own is None else _unpacked(own), look, drawing)
+    draw_points(points, values, None if own is None else _unpacked(own), look, drawing)
     part = f"every {step}th point, " if step > 1 else ""
     return f"{part}{len(points)} points"
 
@@ -101,13 +101,22 @@ def draw_old_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     channels = {one.name: one.values for one in cloud.channels}
     values = channels.get("intensity", channels.get("intensities"))
     listed = None if values is None else np.asarray(values, dtype=np.float64)[: len(points)]
-    _draw(moved(points, pose), listed, None, look, drawing)
+    draw_points(moved(points, pose), listed, None, look, drawing)
     return f"{len(points)} points"
 
 
-def _draw(
+def draw_points(
     points: Array, values: Array | None, own: Array | None, look: Look, drawing: Drawing
 ) -> None:
+    """Draw points by the color of a display.
+
+    Args:
+        points: A row of three coordinates for each.
+        values: Their intensities; None without any.
+        own: Their own colors; None without any.
+        look: Settings of the display.
+        drawing: The drawing.
+    """
     by = look.color or (OWN if own is not None else BY_INTENSITY)
     if by == OWN and own is not None:
         colors = own

@@ -15,6 +15,7 @@ import msgspec
 __all__ = (
     "AXES",
     "DEFAULT",
+    "DEPTH",
     "DESCRIPTION",
     "GRID",
     "ROBOT",
@@ -25,7 +26,7 @@ __all__ = (
     "read_setup",
 )
 
-AXES, GRID, TF, ROBOT = "axes", "grid", "tf", "robot"
+AXES, DEPTH, GRID, TF, ROBOT = "axes", "depth", "grid", "tf", "robot"
 DESCRIPTION = "/robot_description"
 """The parameter of the robot that has no other name."""
 _BETWEEN, _WITHIN = ",", ";"
@@ -38,7 +39,8 @@ class Look(msgspec.Struct, frozen=True):
     """Settings of a display.
 
     Attributes:
-        name: Full name of a topic, or ``grid``, ``axes``, ``tf`` or ``robot``.
+        name: Full name of a topic, also with ``depth:`` before it, or ``grid``, ``axes``, ``tf`` or
+            ``robot``.
         color: ``#rrggbb``, ``height``, ``intensity`` or ``rgb``; empty for the default.
         size: Size in the unit of the display; 0 for the default.
         visible: Whether it is drawn.
@@ -47,6 +49,7 @@ class Look(msgspec.Struct, frozen=True):
         frame: Frame that a grid or axes are at; empty for the fixed frame.
         radius: Radius of axes in metres; 0 for the default.
         cells: Number of cells of a grid along one side; 0 for the default.
+        image: Topic of the image with the colors of a depth image; empty for none.
     """
 
     name: str
@@ -58,6 +61,7 @@ class Look(msgspec.Struct, frozen=True):
     frame: str = ""
     radius: float = 0.0
     cells: int = 0
+    image: str = ""
 
 
 class Setup(msgspec.Struct, frozen=True):
@@ -96,6 +100,7 @@ def _read_look(text: str) -> Look:
         frame=found.get("frame", "").removeprefix("/"),
         radius=_read_length(found.get("radius", "")),
         cells=_read_count(found.get("cells", ""), _MOST_GRID_CELLS),
+        image=found.get("image", ""),
     )
 
 
@@ -121,7 +126,7 @@ def format_setup(setup: Setup) -> str:
 
 def _format_look(look: Look) -> str:
     parts = [look.name]
-    for key in ("color", "size", "keep", "prefix", "frame", "radius", "cells"):
+    for key in ("color", "size", "keep", "prefix", "frame", "radius", "cells", "image"):
         value = getattr(look, key)
         if value:
             parts.append(f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}")
