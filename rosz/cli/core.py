@@ -60,17 +60,19 @@ def core_command(
     keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
     store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = "",
     as_: Annotated[
-        str, Option("--as NAMESPACE", "Put this machine's names below this one for others.")
-    ] = "",
+        str | None, Option("--as NAMESPACE", "Put this machine's names below this one for others.")
+    ] = None,
     share: Annotated[
-        str, Option("--share PATTERNS", "What leaves with --as, such as /odom,/camera/**@2Hz.")
-    ] = "",
+        str | None,
+        Option("--share PATTERNS", "What leaves with --as, such as /odom,/camera/**@2Hz."),
+    ] = None,
     frames: Annotated[
         bool, Option("--frames", "With --as, also put the namespace before the frames of tf.")
     ] = False,
     fleet: Annotated[
-        str, Option("--fleet FILE", "Read --as, --share and more from a file.", suggest.files)
-    ] = "",
+        str | None,
+        Option("--fleet FILE", "Read --as, --share and more from a file.", suggest.files),
+    ] = None,
     ros1: Annotated[
         bool, Option("--ros1", "Also be the master of programs that speak ROS 1's protocol.")
     ] = False,

@@ -25,30 +25,36 @@ _FILE = "fleet.yaml"
 
 
 def read_fleet(
-    environment: Environment, namespace: str, share: str, file: str, *, frames: bool
+    environment: Environment,
+    namespace: str | None,
+    share: str | None,
+    file: str | None,
+    *,
+    frames: bool,
 ) -> FleetPlan | None:
     """Return what crosses; ``None`` if this machine keeps its names.
 
     The options replace what the file says. Without a file, there may be one beside the keys.
+    An option that is empty, as from a variable that is not set, is an error.
 
     Raises:
         UsageError: An option has no meaning, or a file cannot be read.
         YamlError: The file says something else.
     """
-    found = Path(file) if file else _beside_keys(environment)
-    if not (namespace or share or frames or found):
+    found = _beside_keys(environment) if file is None else Path(file)
+    if namespace is None and share is None and found is None and not frames:
         return None
     from rosz.bridges.fleet import FleetPlan, check_prefix, read_plan, read_share
     from rosz.security import read_trusted
 
     plan = FleetPlan() if found is None else read_plan(read_trusted(found), str(found))
-    if namespace:
+    if namespace is not None:
         plan = msgspec.structs.replace(plan, prefix=check_prefix(namespace, "--as"))
-    if share:
+    if share is not None:
         plan = msgspec.structs.replace(plan, share=read_share(share))
     if not plan.prefix:
-        what = f"'as' in '{found}'" if found else "--share and --frames"
-        raise UsageError(f"no namespace for this machine: {what} needs --as, such as --as /robot1")
+        line = f", or a line 'as: /robot1' in '{found}'" if found else ""
+        raise UsageError(f"no namespace for this machine: expected --as /robot1{line}")
     return msgspec.structs.replace(plan, frames=plan.frames or frames)
 
 

@@ -178,6 +178,20 @@ def test_a_malformed_endpoint(shell: Shell, option: str, endpoint: str) -> None:
     assert result.err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        (("--as", ""), "--as is '': expected a namespace such as /robot1"),
+        (("--as", "/robot1", "--share", ""), "--share has ''; expected such as /odom"),
+        (("--share", "/odom"), "no namespace for this machine: expected --as /robot1\n"),
+    ],
+)
+def test_what_would_let_all_names_leave(shell: Shell, options: tuple[str, ...], error: str) -> None:
+    result = shell("core", "--connect", f"tcp/127.0.0.1:{free_port()}", *options)
+    assert result.code == 2
+    assert result.err.startswith(f"ERROR: {error}")
+
+
 def test_a_store_outlives_its_core(shell: Shell, tmp_path: Path) -> None:
     store = tmp_path / "params.db"
     for expected in ("", "left\n"):

@@ -112,9 +112,8 @@ def read_share(text: str) -> tuple[Shared, ...]:
     Raises:
         UsageError: A part is not a pattern, or its rate is not a number above 0.
     """
-    parts = [part.strip() for part in text.split(",")]
     found = []
-    for part in filter(None, parts):
+    for part in map(str.strip, text.split(",")):
         shared = _shared(part)
         if shared is None:
             raise UsageError(f"--share has '{part}'; expected such as /odom or /camera/**@2Hz")

@@ -65,5 +65,11 @@ def test_errors_name_line_and_column(text: str, error: str) -> None:
 
 def test_share_of_the_command_line() -> None:
     assert read_share("/odom, /camera/**@2.5Hz") == (Shared("/odom"), Shared("/camera/**", 2.5))
-    with pytest.raises(UsageError, match="'/a@fastHz'"):
-        read_share("/a@fastHz")
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"), [("/a@fastHz", "'/a@fastHz'"), ("", "''"), ("/a,,/b", "''"), ("/a,", "''")]
+)
+def test_wrong_shares_of_the_command_line(text: str, wrong: str) -> None:
+    with pytest.raises(UsageError, match=f"--share has {wrong}"):
+        read_share(text)
