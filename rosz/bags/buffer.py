@@ -89,8 +89,8 @@ class Buffer(Generic[T]):
 class Channels:
     """The capacity of each topic's Zenoh channel, so that all together keep to a bound.
 
-    Topics with large messages share a number of bytes. Sizes and numbers are rounded to powers of
-    two, so that they change rarely.
+    Topics with large messages share a number of bytes. Sizes and numbers are rounded, so that they
+    change rarely.
 
     Args:
         limit: The bytes that they share.
@@ -118,7 +118,9 @@ class Channels:
         largest = self._largest.get(topic, 0)
         if size > largest:
             with self._lock:
-                largest = self._largest[topic] = 1 << (size - 1).bit_length()
+                # To an eighth more at most: images of 1 MB have some bytes more than 1 MB.
+                step = 1 << max(size.bit_length() - 4, 0)
+                largest = self._largest[topic] = -(-size // step) * step
                 large = [one for one in self._largest.values() if self._is_large(one)]
                 self._share = self._limit // max(len(large), 1)
                 self.size = sum(one * self._fitting(one) for one in large)
@@ -129,4 +131,5 @@ class Channels:
 
     def _fitting(self, size: int) -> int:
         count = self._share // size
-        return min(max(1 << count.bit_length() >> 1, _LEAST), self._depth)
+        step = 1 << max(count.bit_length() - 2, 0)
+        return min(max(count // step * step, _LEAST), self._depth)
