@@ -28,7 +28,8 @@ def test_info_imports_nothing_slow(tmp_path: Path) -> None:
 
 
 def test_recorder_of_mcap_imports_no_other_format() -> None:
-    large = ("_hashlib", "sqlite3", "yaml", "rosz.msgs.rcl_interfaces.srv", "rosz.bags.ros1_reader")
+    ours = ("rosz.msgs.rcl_interfaces.srv", "rosz.bags.ros1_reader")
+    large = ("_hashlib", "importlib.abc", "sqlite3", "yaml", *ours)
     script = f"""
 import sys
 import rosz.bags.parameters, rosz.bags.recorder, rosz.bags.recording, rosz.cli.bag.record
