@@ -71,7 +71,11 @@ def test_every_page_opens_without_a_message(
         world.open(path + QUERY.get(path, ""))
         texts = SEEN[path]
         world.should_see(*(texts if screen == "laptop" else texts[:1]))
-        take_picture(world.browser, folder, f"{path.strip('/') or 'overview'}-{screen}-{theme}")
+        for colors in (theme, "dark" if theme == "light" else "light"):
+            set_screen(world.browser, screen, colors)  # the page follows the browser
+            take_picture(
+                world.browser, folder, f"{path.strip('/') or 'overview'}-{screen}-{colors}"
+            )
         wide = "return document.documentElement.scrollWidth - window.innerWidth"
         assert world.ask(wide) <= 0, f"{path} is wider than a {screen}"
         assert world.messages() == []

@@ -106,13 +106,13 @@ class _Console:
     def _add_filter(self) -> None:
         choice = self._choice
         self._inputs: dict[str, ui.input] = {}
-        with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
+        with ui.row().classes("rosz-card w-full items-center gap-2 px-3 py-2"):
             ui.select(
                 _LEVELS,
                 value=choice.level,
                 label="Lowest level",
                 on_change=lambda change: self._filter(level=change.value),
-            ).props("dense options-dense").classes("w-28")
+            ).props("dense options-dense").classes("w-24")
             for field, label, props in (
                 ("node", "Node", "clearable"),
                 ("pattern", "Text", "clearable"),
@@ -126,7 +126,7 @@ class _Console:
                         **{field: change.value or ""}
                     ),
                 )
-                self._inputs[field].props(f"dense debounce=300 {props}").classes("w-32")
+                self._inputs[field].props(f"dense debounce=300 {props}").classes("w-28")
             ui.space()
             self._pause = ui.button("Pause", icon="pause", on_click=self._toggle).props(
                 "flat dense no-caps"

@@ -173,12 +173,11 @@ class _Graph:
                 ).props("dense clearable debounce=400").classes("w-44")
             self._add_options()
             ui.space()
-            ui.button(icon="remove", on_click=lambda: self._scale(-20)).props(
-                'flat dense round aria-label="Smaller"'
-            )
-            ui.button(icon="add", on_click=lambda: self._scale(20)).props(
-                'flat dense round aria-label="Larger"'
-            )
+            with ui.row().classes("items-center gap-1 flex-nowrap"):
+                for icon, step, label in (("remove", -20, "Smaller"), ("add", 20, "Larger")):
+                    ui.button(icon=icon, on_click=lambda step=step: self._scale(step)).props(
+                        f'flat dense round aria-label="{label}"'
+                    )
             ui.button(
                 "SVG",
                 icon="download",

@@ -76,7 +76,7 @@ class _Services:
                 pagination=12,
             )
             .classes("w-full")
-            .props("flat dense")
+            .props("flat dense wrap-cells")
         )
         offer_choice(table, self._choose)
         search.on_value_change(lambda change: setattr(table, "filter", change.value or ""))
