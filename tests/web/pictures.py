@@ -41,7 +41,7 @@ OF_MANUAL = {
     "overview": ("/", "laptop", "light"),
     "graph": ("/graph?content=all&hide=tf,debug,parameters", "laptop", "light"),
     "plot": ("/plot" + QUERY["/plot"], "laptop", "light"),
-    "topics": ("/topics?topic=/cmd_vel", "laptop", "light"),
+    "topics": ("/topics?topic=/turtlesim1/turtle1/cmd_vel", "laptop", "light"),
     "console": ("/console", "laptop", "light"),
     "drive": ("/drive" + QUERY["/drive"], "laptop", "light"),
     "phone": ("/", "phone", "dark"),
@@ -91,12 +91,14 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=MANUAL)
     parser.add_argument("--manual", action="store_true", help="those of the manual")
-    parser.add_argument("--only", help="a page, such as /graph")
+    parser.add_argument("--only", help="one, such as /graph, or graph of the manual")
     options = parser.parse_args()
     options.folder.mkdir(exist_ok=True)
     with lively() as world:
         if options.manual:
             for name, (path, screen, theme) in OF_MANUAL.items():
+                if options.only not in (None, name):
+                    continue
                 take(world, path, screen, theme, options.folder / f"{name}.webp")
             return
         for entry in ENTRIES:

@@ -177,7 +177,9 @@ class _Echo:
                 ui.space()
                 self._flow = ui.label("").classes("rosz-soft rosz-number text-sm")
             self._note = ui.label("Choose a topic.").classes("rosz-soft")
-            self._tree = ui.tree([], node_key="id", label_key="name").props("dense no-transition")
+            self._tree = ui.tree([], node_key="id", label_key="name").props(
+                'dense no-transition no-nodes-label=" "'
+            )
             self._tree.classes("rosz-mono w-full overflow-auto").style("max-height: 65vh")
             self._tree.add_slot(
                 "default-header",
