@@ -110,11 +110,21 @@ def test_a_robot_joins_and_is_left_alone(robot: Robot, node: Node) -> None:
 
 def test_names_are_chosen_and_moved(robot: Robot, node: Node) -> None:
     talkers = [robot.rospy(TALKER, f"talker_{name}", f"/{name}") for name in ("scan", "image")]
-    with robot.join(choice=Choice(topics=("/sc*",)), namespace="/robot1"):
+    robot.run("rosparam", "set", "/speed", "1")
+    robot.run("rosparam", "set", "/secret", "1")
+    choice = Choice(topics=("/sc*",), services=("*/get_loggers",), params=("/sp*",))
+    with robot.join(choice=choice, namespace="/robot1"):
         assert _heard(node, "/robot1/scan").get(timeout=TIMEOUT).data.startswith("rospy ")
-        view = node.context.graph.view()
-        assert "/robot1/talker_scan" in view.nodes()
-        assert "/robot1/image" not in view.topics()
+        view = node.context.graph.view
+        assert "/robot1/talker_scan" in view().nodes()
+        eventually(lambda: view().servers("/robot1/talker_scan/get_loggers"))
+        eventually(lambda: node.params.get("/robot1/speed", None) == 1)
+        node.params["/robot1/speed"] = 2
+        eventually(lambda: robot.run("rosparam", "get", "/speed").strip() == "2")
+        assert "/robot1/image" not in view().topics()
+        assert "/robot1/talker_scan/set_logger_level" not in view().services()
+        assert not node.params.has("/robot1/secret")
+    robot.run("rosparam", "delete", "/speed")
     for talker in talkers:
         talker.send(signal.SIGINT)
         talker.exit_code()

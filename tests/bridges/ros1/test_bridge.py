@@ -180,7 +180,10 @@ def test_each_latched_publisher_keeps_its_last_message(world: World, node: Node)
 
 
 def test_other_types_are_refused_in_words(
-    world: World, node: Node, caplog: pytest.LogCaptureFixture
+    world: World,
+    node: Node,
+    caplog: pytest.LogCaptureFixture,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     node.publisher("/number", Int32)
     world.rospy(LISTENER, "mistaken", "/number")
@@ -194,6 +197,19 @@ def test_other_types_are_refused_in_words(
     refused = partial(_refusal, world, "/number", "/mistaken")
     eventually(lambda: words in refused())
     assert told() == 1
+
+    world.rospy(TALKER, "other_talker", "/text")
+    eventually(lambda: node.context.graph.view().publishers("/text"))
+    heard = _heard(node, "/text", Int32)
+    printed: list[str] = []
+    words = "node '/other_talker' publishes topic '/text' with type 'std_msgs/msg/String', but here"
+
+    def warned() -> bool:
+        printed.append(capfd.readouterr().err)
+        return words in "".join(printed)
+
+    eventually(warned)
+    assert heard.empty()
 
 
 def _refusal(world: World, topic: str, node: str) -> str:
