@@ -505,7 +505,7 @@ def test_what_waits_for_the_processor_is_bounded(
         eventually(lambda: made.count_of("/big") + made.recorder.lost == 40)
     with open_reader(network.folder / "x.mcap") as reader:
         found = [int(bytes(one.data[8:14])) for one in reader.messages({"/big"})]
-    assert found == [0, 1, *range(32, 40)]
+    assert found == [0, 1, *range(28, 40)]  # 12 of 16 MB, as sizes and numbers are rounded
 
 
 def test_snapshots_are_of_the_last_seconds(network: Network) -> None:
