@@ -157,7 +157,8 @@ class PublishedTopic:
             sock.close()
             shared.changes.submit(partial(self._failed, str(error)))
             return
-        shared.changes.submit(partial(self._connected, sock, header, caller))
+        if not shared.changes.offer(partial(self._connected, sock, header, caller)):
+            sock.close()  # the bridge has ended meanwhile
 
     def _caller(self) -> str:
         """Return the node that the connection stands for."""

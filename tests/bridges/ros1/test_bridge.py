@@ -198,7 +198,7 @@ def test_other_types_are_refused_in_words(
     eventually(lambda: words in refused())
     assert told() == 1
 
-    world.rospy(TALKER, "other_talker", "/text")
+    talker = world.rospy(TALKER, "other_talker", "/text")
     eventually(lambda: node.context.graph.view().publishers("/text"))
     heard = _heard(node, "/text", Int32)
     printed: list[str] = []
@@ -210,6 +210,8 @@ def test_other_types_are_refused_in_words(
 
     eventually(warned)
     assert heard.empty()
+    talker.kill()
+    eventually(lambda: not node.context.graph.view().publishers("/text"))
 
 
 def _refusal(world: World, topic: str, node: str) -> str:
