@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import socket
 import ssl
 import threading
@@ -39,6 +40,8 @@ _ANSWER_SECONDS = 20.0
 """Seconds within which a browser must answer a ping: one that draws much in 3D without a graphics
 processor, or that opens a page on a busy machine, answers late. It would lose what one fills in."""
 _LOGGERS = ("nicegui", "uvicorn.error")
+_NICENESS = 10
+"""How far the pages give way to other programs: a robot does not wait for those who watch it."""
 
 
 def _wait_for_answers() -> None:
@@ -126,6 +129,7 @@ class PageServer:
             raise TransportError(f"the page was not ready within {_START_SECONDS:g} seconds")
 
     def _run(self) -> None:
+        os.nice(_NICENESS)  # of this thread, and of those that it starts; see sched(7)
         asyncio.run(self._server.serve([self._socket]))
 
     def close(self) -> None:

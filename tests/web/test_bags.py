@@ -6,6 +6,7 @@ import io
 import os
 import signal
 import tarfile
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -122,6 +123,23 @@ def _ended(run: BagRun | None) -> BagRun:
     assert run is not None
     assert run.wait(LONG)
     return run
+
+
+@pytest.mark.usefixtures("here")
+def test_a_recorder_does_not_give_way_as_pages_do(tmp_path: Path) -> None:
+    bags = Bags(tmp_path, Permission())
+    order = RecordOrder(name="run.mcap", topics=("/count",))
+
+    def record() -> None:
+        os.nice(7)  # of this thread, as that of the server
+        bags.record(order)
+
+    thread = threading.Thread(target=record)
+    thread.start()
+    thread.join()
+    assert bags.recording is not None
+    assert os.getpriority(os.PRIO_PROCESS, bags.recording.pid) == os.getpriority(os.PRIO_PROCESS, 0)
+    bags.close()
 
 
 @pytest.mark.usefixtures("here")

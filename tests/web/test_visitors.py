@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 from urllib.error import HTTPError
 
 import pytest
@@ -57,6 +60,15 @@ def pages() -> Iterator[Pages]:
         yield Pages(network)
     finally:
         network.close()
+
+
+def test_pages_give_way_to_other_programs(pages: Pages) -> None:
+    own = os.getpriority(os.PRIO_PROCESS, 0)
+    found = set()
+    for thread in Path(f"/proc/{pages.server.pid}/task").iterdir():
+        with suppress(ProcessLookupError):  # it has ended
+            found.add(os.getpriority(os.PRIO_PROCESS, int(thread.name)))
+    assert found == {own, min(19, own + 10)}
 
 
 def refusal(address: str) -> tuple[int, str]:

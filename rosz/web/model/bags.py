@@ -17,6 +17,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -37,6 +38,7 @@ _ACTIVE = ".active"
 _METADATA = "metadata.yaml"
 _NAME = re.compile(r"[^/\\\0.][^/\\\0]*")
 _MOST_LINES = 20
+_START_SECONDS = 60.0
 _STOP_SECONDS = 10.0
 _SILENT_SECONDS = 10.0
 """Seconds without a report, after which none is expected; several come in a second."""
@@ -173,6 +175,7 @@ class BagRun:
     Args:
         order: What it does.
         folder: Its working directory.
+        starter: What starts it: the process has the priority of its thread.
 
     Attributes:
         order: As given.
@@ -183,7 +186,7 @@ class BagRun:
         messages_per_second: Messages per second.
     """
 
-    def __init__(self, order: BagOrder, folder: Path) -> None:
+    def __init__(self, order: BagOrder, folder: Path, starter: Executor) -> None:
         self.order: BagOrder = order
         self.last: BagReport = BagReport()
         self.lines: deque[str] = deque(maxlen=_MOST_LINES)
@@ -196,14 +199,15 @@ class BagRun:
         self._ended = threading.Event()
         self._lock = threading.Lock()
         try:
-            self._process = process = subprocess.Popen(
+            self._process = process = starter.submit(
+                subprocess.Popen,
                 [sys.executable, "-m", "rosz.web.bag_process"],
                 cwd=folder,
                 bufsize=0,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 start_new_session=True,  # Ctrl-C goes to the page, which ends it
-            )
+            ).result(_START_SECONDS)
         except OSError as error:
             raise BagError(f"cannot start its process: {error.strerror}", str(folder)) from error
         self._commands = cast("io.FileIO", process.stdin)
@@ -315,6 +319,9 @@ class Bags:
         self.playing: BagRun | None = None
         self._permission = permission
         self._lock = threading.Lock()
+        # Its thread begins here: one of the server's threads would have their low priority.
+        self._starter = ThreadPoolExecutor(1, "rosz-web-bags")
+        self._starter.submit(threading.get_ident)
 
     def record(self, order: RecordOrder) -> None:
         """Begin to record into a bag of the folder; the time is its name if it has none.
@@ -335,7 +342,7 @@ class Bags:
         with self._lock:
             if self.recording is not None and not self.recording.ended:
                 raise UsageError(f"a recording goes on: {self.recording.last.path}; stop it first")
-            self.recording = BagRun(BagOrder(record=order), self.folder.path)
+            self.recording = BagRun(BagOrder(record=order), self.folder.path, self._starter)
 
     def play(self, order: PlayOrder) -> None:
         """Begin to play a bag in place of the one that plays.
@@ -351,7 +358,7 @@ class Bags:
         with self._lock:
             if self.playing is not None:
                 self.playing.close()
-            self.playing = BagRun(BagOrder(play=order), self.folder.path)
+            self.playing = BagRun(BagOrder(play=order), self.folder.path, self._starter)
 
     def control(self, command: BagCommand) -> None:
         """Control the bag that plays.
