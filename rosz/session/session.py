@@ -17,7 +17,7 @@ import zenoh.ext
 
 from rosz.errors import ClosedError
 from rosz.lifecycle import Closable, Lifecycle
-from rosz.session.at_exit import ENDING, ClosedSession
+from rosz.session.at_exit import ENDING, OPEN, ClosedSession
 from rosz.session.channels import declare, declare_callback, declare_rare, open_channel
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
@@ -556,6 +556,7 @@ class Session:
             self._registration.close()
         self._raw = ClosedSession(self._lifecycle.reason)
         ENDING.set()
+        OPEN.clear()
 
     def __enter__(self) -> Self:
         return self

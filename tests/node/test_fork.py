@@ -239,3 +239,22 @@ def test_a_child_that_is_terminated_at_its_beginning(network: Network) -> None:
     )
     assert program.exit_code() == 0, program.output
     assert program.lines == [f"child: {signal.SIGTERM:d}", "parent is shut down: False"]
+
+
+def test_the_end_of_a_child_waits_for_no_thread_of_the_parent(network: Network) -> None:
+    program = network.program(
+        """
+        import os
+        import rosz
+        from rosz.session.at_exit import wait_for_calls
+
+        with rosz.Node("parent"):
+            child = os.fork()
+            if not child:
+                print("waits for nothing:", wait_for_calls(0.0), flush=True)
+                os._exit(0)
+            os.waitpid(child, 0)
+        """
+    )
+    assert program.exit_code() == 0
+    assert "waits for nothing: True" in program.lines
