@@ -41,13 +41,13 @@ from rosz.web.scene import (
     open_display,
     read_setup,
 )
-from rosz.web.scene.cameras import draw_camera
 from rosz.web.scene.depth import draw_depth
 from rosz.web.scene.detections import draw_boxes, draw_polygons
 from rosz.web.scene.display import FrameDisplay
 from rosz.web.scene.drawing import Drawing
 from rosz.web.scene.poses import Trail, draw_cells
 from rosz.web.scene.robot import RobotDisplay
+from rosz.web.scene.sensors import draw_camera
 from rosz.web.scene.vectors import draw_accel, draw_imu, draw_twist, draw_wrench
 
 from .test_scene import ASIDE, parts

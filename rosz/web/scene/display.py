@@ -15,7 +15,7 @@ from rosz.introspect.subscribe import find_class, find_token, topic_types
 from rosz.names import short_type
 from rosz.transforms import IDENTITY, Pose
 from rosz.web.model import Frames, ImageWatch, read_frame
-from rosz.web.scene import cameras, detections, poses, sensors, vectors
+from rosz.web.scene import detections, poses, sensors, vectors
 from rosz.web.scene.colors import color_bytes
 from rosz.web.scene.drawing import MEDIA, Drawing
 from rosz.web.scene.setup import Look
@@ -55,7 +55,7 @@ _DRAW: dict[str, _Draw] = {
     "nav_msgs/GridCells": poses.draw_cells,
     "nav_msgs/Odometry": poses.draw_stamped_pose,
     "nav_msgs/Path": poses.draw_path,
-    "sensor_msgs/CameraInfo": cameras.draw_camera,
+    "sensor_msgs/CameraInfo": sensors.draw_camera,
     "sensor_msgs/Imu": vectors.draw_imu,
     "sensor_msgs/LaserScan": sensors.draw_scan,
     "sensor_msgs/PointCloud": sensors.draw_old_cloud,

@@ -15,7 +15,7 @@ import struct
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
 import msgspec
@@ -38,6 +38,8 @@ _GLB_HEADER = struct.Struct("<4sIII4s")
 _MEDIA = {"stl": "model/stl", "glb": "model/gltf-binary"}
 _UNIT = re.compile(rb"<unit\b[^>]*\bmeter=[\"']([^\"']*)")
 _LIBRARY = "needs libraries: pip install 'rosz[web]'"
+
+T = TypeVar("T")
 
 Publish = Callable[[Callable[[], tuple[bytes, str]]], str]
 
@@ -97,17 +99,7 @@ class Meshes:
         Raises:
             UsageError: It cannot be shown; the text says why.
         """
-        with self._lock:
-            found = self._found.get(uri)
-            if found is None:
-                try:
-                    found = self._open(uri)
-                except RoszError as error:
-                    found = str(error)
-                self._found[uri] = found
-        if isinstance(found, str):
-            raise UsageError(found)
-        return found
+        return self._once(uri, self._found, self._open)
 
     def texture(self, uri: str) -> Texture:
         """Return a texture.
@@ -118,19 +110,25 @@ class Meshes:
         Raises:
             UsageError: It cannot be shown; the text says why.
         """
+        return self._once(uri, self._textures, self._open_texture)
+
+    def _once(self, uri: str, found: dict[str, T | str], read: Callable[[str], T]) -> T:
+        """Return what is read of a file; it, or the reason why it cannot be, is kept."""
         with self._lock:
-            found = self._textures.get(uri)
-            if found is None:
+            one = found.get(uri)
+            if one is None:
                 try:
-                    data = _read_picture(self._assets, self._in_package(uri))
-                    data, media, color = read_texture(uri, data)
-                    found = Texture(self._add(lambda: (data, media)), color)
+                    one = read(uri)
                 except RoszError as error:
-                    found = str(error)
-                self._textures[uri] = found
-        if isinstance(found, str):
-            raise UsageError(found)
-        return found
+                    one = str(error)
+                found[uri] = one
+        if isinstance(one, str):
+            raise UsageError(one)
+        return one
+
+    def _open_texture(self, uri: str) -> Texture:
+        data, media, color = read_texture(uri, _read_picture(self._assets, self._in_package(uri)))
+        return Texture(self._add(lambda: (data, media)), color)
 
     def _open(self, uri: str) -> Mesh:
         ending = posixpath.splitext(urlsplit(uri).path)[1].lower()

@@ -1,4 +1,4 @@
-"""Laser scans, point clouds and ranges."""
+"""Laser scans, point clouds, ranges, and the fields of view of cameras."""
 
 from __future__ import annotations
 
@@ -13,11 +13,20 @@ from rosz.web.scene.colors import BY_HEIGHT, BY_INTENSITY, OWN, color_bytes, rai
 from rosz.web.scene.drawing import Array, Drawing, moved, placed
 from rosz.web.scene.setup import Look
 
-__all__ = ("MOST_POINTS", "draw_cloud", "draw_old_cloud", "draw_points", "draw_range", "draw_scan")
+__all__ = (
+    "MOST_POINTS",
+    "draw_camera",
+    "draw_cloud",
+    "draw_old_cloud",
+    "draw_points",
+    "draw_range",
+    "draw_scan",
+)
 
 MOST_POINTS = 500_000
 """Points of a cloud that are drawn; of more, every second one, or every third."""
 _PIXELS = 3.0
+_FAR = 1.0
 
 
 def draw_scan(scan: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
@@ -143,3 +152,28 @@ def draw_range(found: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     )
     drawing.shapes("cone", placed(pose) @ inner, color)
     return f"{found.range:.3g} m"
+
+
+def draw_camera(info: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+    """Draw what a camera sees as a pyramid, by its CameraInfo; the size is its height.
+
+    Raises:
+        UsageError: The camera is not calibrated.
+    """
+    (fx, _, cx), (_, fy, cy) = (info.k[0:3], info.k[3:6])
+    if not (fx and fy and info.width and info.height):
+        raise UsageError("the camera is not calibrated: its k or its size is 0")
+    far = look.size or _FAR
+    corners = np.array(
+        [
+            ((u - cx) / fx * far, (v - cy) / fy * far, far)
+            for u, v in ((0, 0), (info.width, 0), (info.width, info.height), (0, info.height))
+        ]
+    )
+    ends = [
+        point
+        for number in range(4)
+        for point in (np.zeros(3), corners[number], corners[number], corners[number - 1])
+    ]
+    drawing.lines(moved(np.array(ends), pose), color_bytes(look.color, "#c13c8b"))
+    return f"{info.width} x {info.height}"
