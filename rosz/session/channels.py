@@ -97,7 +97,7 @@ def declare_rare(declaring: Callable[[Any], T]) -> tuple[T, Channel]:
 def declare_callback(declaring: Callable[[Any], T]) -> tuple[T, Channel | CallbackQueue]:
     """Declare something for which items arrive rarely: no thread waits for them.
 
-    What is said of `declare_rare` applies.
+    The limits of `declare_rare` apply.
 
     Args:
         declaring: Function that declares it with a handler.
@@ -170,15 +170,15 @@ class _RareChannel:
 
 
 class CallbackQueue:
-    """Items that Zenoh adds, and a function that handles all of them on a thread that it borrows.
+    """A queue that Zenoh fills, and a function that handles the items on a thread that is lent.
 
-    The function runs on one thread at a time. Where no thread can be had, it runs on the one that
+    The function runs on one thread at a time. If no thread can be lent, it runs on the thread that
     adds the items.
     """
 
     def __init__(self) -> None:
         self._items: deque[Any] = deque()
-        # Has an item while nobody handles the items: to pop it is to take that on.
+        # One item while no thread handles the queue. A thread has to pop it before it does.
         self._unhandled: deque[bool] = deque()
         self._handle: Callable[[], object] = self._items.clear
         self._program = current()
@@ -225,7 +225,9 @@ class CallbackQueue:
     def _run(self) -> None:
         with within(self._program):
             while True:
-                self._handle()
-                self._unhandled.append(True)
+                try:
+                    self._handle()
+                finally:
+                    self._unhandled.append(True)
                 if not self._items or not self._begin():
                     return

@@ -14,7 +14,7 @@ from network import TIMEOUT, Network, eventually
 
 from rosz.session import Sample, Session, channels
 from rosz.session.at_exit import OPEN
-from rosz.session.channels import declare_callback, declare_rare
+from rosz.session.channels import CallbackQueue, declare_callback, declare_rare
 
 COUNT = 600  # more than Zenoh keeps for a thread of Python
 
@@ -32,6 +32,17 @@ RARE: dict[str, Callable[[Session, Callable[..., None]], Any]] = {
 }
 
 
+def until_heard(other: Session, heard: SimpleQueue[Any]) -> None:
+    """Put and query from another session until something is heard."""
+
+    def is_heard() -> bool:
+        other.put("a/b", b"")
+        other.get("a/b", timeout=0.1)
+        return not heard.empty()
+
+    eventually(is_heard)
+
+
 @pytest.mark.parametrize("kind", RARE)
 def test_no_thread_wakes_while_nothing_arrives(network: Network, kind: str) -> None:
     session, other = network.session(), network.session()
@@ -45,12 +56,7 @@ def test_no_thread_wakes_while_nothing_arrives(network: Network, kind: str) -> N
     assert {one.name for one in new - own} <= {"rosz-lent"}
     token = other.token("a/b")
 
-    def is_heard() -> bool:
-        other.put("a/b", b"")
-        other.get("a/b", timeout=0.1)
-        return not heard.empty()
-
-    eventually(is_heard)
+    until_heard(other, heard)
     while not heard.empty():
         heard.get()
     counts = {one: _wakes(one) for one in own}
@@ -139,12 +145,7 @@ def test_callbacks_where_no_thread_is_left(network: Network, kind: str) -> None:
     declared = RARE[kind](session, lambda *_: heard.put(threading.current_thread().name))
     token = other.token("a/b")
 
-    def is_heard() -> bool:
-        other.put("a/b", b"")
-        other.get("a/b", timeout=0.1)
-        return not heard.empty()
-
-    eventually(is_heard)
+    until_heard(other, heard)
     assert "pyo3" in heard.get()
     declared.close()
     token.close()
@@ -154,6 +155,23 @@ def test_callbacks_where_no_thread_is_left(network: Network, kind: str) -> None:
 def no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lend no thread."""
     monkeypatch.setattr(channels, "lend_thread", lambda _: False)
+
+
+def test_a_queue_is_handled_again_after_an_error(caplog: pytest.LogCaptureFixture) -> None:
+    queue, handled = CallbackQueue(), SimpleQueue[str]()
+
+    def handle() -> None:
+        item = queue.take()
+        handled.put(item)
+        if item == "bad":
+            raise ValueError("no such item")
+
+    queue.handle_with(handle, at_once=False)
+    for item in ("bad", "good"):
+        queue.handler.callback(item)
+        assert handled.get(timeout=TIMEOUT) == item
+        eventually(lambda: bool(queue._unhandled), "the end of the task")
+    eventually(lambda: "no such item" in caplog.text, "the log")
 
 
 def test_a_failed_callback_declaration_is_not_waited_for(network: Network) -> None:
