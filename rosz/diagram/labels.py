@@ -1,4 +1,4 @@
-"""Where the labels of arrows are written so that none covers another; pure."""
+"""Places for the labels of arrows, chosen so that no label covers another."""
 
 from __future__ import annotations
 

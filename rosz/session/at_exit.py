@@ -28,7 +28,7 @@ function on a stack, or the function sees that this is set.
 """
 
 OPEN: set[object] = set()
-"""What threads that Zenoh started add items to. Such a thread removes it when it leaves Python."""
+"""Queues to which threads that Zenoh started add items; a thread removes its queue when it ends."""
 
 _leaked: list[object] = []
 _PACKAGE = str(Path(__file__).parent)

@@ -134,7 +134,7 @@ class Callbacks(Declared):
         declared: The object of Zenoh, and where its items arrive.
         callback: Function called with each item; exceptions are logged.
         begin: Function called once, before the first item.
-        idle: Function called whenever there is no item left.
+        idle: Function called each time when all items have been handled.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class _Delivery:
         take: Function that returns the oldest item; None if there is none.
         callback: Function called with each item.
         begin: Function called once, before the first item.
-        idle: Function called whenever there is no item left.
+        idle: Function called each time when all items have been handled.
     """
 
     def __init__(

@@ -66,7 +66,7 @@ _INSTEAD = {
     "String": "see the page /topics",
     "Effort": "see the page /plot",
 }
-"""What is said of other displays."""
+"""Hints for displays of rviz that are not shown."""
 _COLORS = {"AxisColor": "height", "Intensity": "intensity", "RGB8": "rgb"}
 _PICTURES = ("Camera", "Image", "OverlayImage")
 _ROBOTS = ("MotionPlanning", "PlanningScene", "RobotModel", "RobotState", "Trajectory")
@@ -131,7 +131,7 @@ def _why_not(kind: str) -> str:
     """Return why a display of rviz is not shown."""
     if kind in _TOPICS:
         return "it names no topic"
-    return _INSTEAD.get(kind, "there is no such display here")
+    return _INSTEAD.get(kind, "this page has no display of that class")
 
 
 def _look(display: dict[str, Any], kind: str, resolve: Callable[[str], str]) -> Look | None:

@@ -41,7 +41,7 @@ _ANSWER_SECONDS = 20.0
 processor, or that opens a page on a busy machine, answers late. It would lose what one fills in."""
 _LOGGERS = ("nicegui", "uvicorn.error")
 _NICENESS = 10
-"""How far the pages give way to other programs: a robot does not wait for those who watch it."""
+"""Niceness of the threads of the server, so that nodes of the machine run before the pages."""
 
 
 def _wait_for_answers() -> None:

@@ -73,7 +73,7 @@ _NUMBERS = {
 """More settings of displays, by their types."""
 _UNITS = dict.fromkeys(_CHOICES, "Pixels")
 _BACKGROUND = "getComputedStyle(document.body).getPropertyValue('--rosz-scene').trim()"
-"""What the browser evaluates before its first drawing."""
+"""JavaScript that returns the color of the page, for the first drawing."""
 _VIEWS = {"orbit": "From the side", "top": "From above"}
 
 

@@ -1,4 +1,4 @@
-"""What jsk_recognition_msgs reports of recognised things: boxes and polygons."""
+"""Bounding boxes and polygons of jsk_recognition_msgs, which report recognised objects."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ _INNER, _OUTER = 0.5, 0.65
 
 
 class Held(msgspec.Struct, frozen=True):
-    """What happened at a handle in the browser.
+    """An event of a handle in the browser.
 
     Attributes:
         display: Name of the display.

@@ -25,7 +25,7 @@ __all__ = ("MAP_TYPE", "UPDATES", "MapDisplay", "draw_map", "read_cells", "updat
 
 MAP_TYPE = "nav_msgs/OccupancyGrid"
 UPDATES = "_updates"
-"""What the topic of updates has after the name of the topic of the map."""
+"""Suffix that the topic of a map gets for the topic of its updates."""
 _MOST_CELLS = 4096
 _QUEUE = 10
 

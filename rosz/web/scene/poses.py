@@ -37,7 +37,7 @@ _STEP, _TURN = 0.1, 0.1
 
 
 def rotation_from(q: Any) -> tuple[float, float, float, float]:
-    """Return a geometry_msgs/Quaternion with length 1; none is no rotation."""
+    """Return a geometry_msgs/Quaternion scaled to length 1; one of length 0 means no rotation."""
     length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
     if not length or not math.isfinite(length):
         return 0.0, 0.0, 0.0, 1.0

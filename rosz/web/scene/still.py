@@ -1,4 +1,4 @@
-"""What needs no messages: the grid on the ground, and the axes of one frame."""
+"""Displays that need no messages: the grid, and the axes of one frame."""
 
 from __future__ import annotations
 

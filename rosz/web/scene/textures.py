@@ -12,7 +12,7 @@ from rosz.web.scene.drawing import Array
 __all__ = ("read_texture",)
 
 _MEDIA = {"JPEG": "image/jpeg", "PNG": "image/png", "WEBP": "image/webp"}
-"""What browsers read; other pictures become PNG."""
+"""Formats that browsers can show; pictures in other formats are converted to PNG."""
 
 
 def read_texture(uri: str, data: bytes) -> tuple[bytes, str, Array]:
