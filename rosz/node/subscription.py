@@ -219,13 +219,15 @@ class Subscription(Entity, Generic[M]):
     def _dispatch_queued(self, item: _Item) -> None:
         """Dispatch an item, and all that have come until there is none."""
         items, dispatch = self._queue.items, self._dispatch
-        with suppress(IndexError):  # there is none
-            while True:
-                sample, decoder = item
-                if decoder is not None and isinstance(sample, Reply):
-                    self._await_live(sample, decoder)
-                dispatch(sample, decoder)
+        while True:
+            sample, decoder = item
+            if decoder is not None and isinstance(sample, Reply):
+                self._await_live(sample, decoder)
+            dispatch(sample, decoder)
+            try:
                 item = items.popleft()
+            except IndexError:
+                return
 
     def _await_live(self, replayed: Reply, decoder: Decoder) -> None:
         """Wait for the live samples up to a replayed one that was published since the start."""
