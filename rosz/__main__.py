@@ -3,8 +3,6 @@
 # The module signal is a layer over _signal that takes long to import; Ctrl-C could interrupt that.
 import _signal as signal  # type: ignore[import-not-found]  # it has no stubs
 
-__all__ = ("main",)
-
 
 def main() -> None:
     """Run the command line of this process, and exit with its exit code.

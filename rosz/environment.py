@@ -21,12 +21,11 @@ import msgspec
 from rosz.errors import UsageError
 from rosz.packages import SYSTEM, PackageIndex, manifest_of
 
-__all__ = ("DEFAULT_RENDEZVOUS", "Environment", "package_index")
-
 DEFAULT_RENDEZVOUS = "tcp/localhost:7447"
 """The endpoint where the sessions of one machine meet, with the port of rmw_zenoh's router."""
 
 _MAX_DOMAIN = 232
+_BAG_LIMIT = 128 << 20
 _CATKIN_MARKER = ".catkin"
 _PRIVATE = "private"
 _WINDOWS = Path(__file__).parent / "web" / "windows"
@@ -57,8 +56,8 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         zenoh_override: ``ZENOH_CONFIG_OVERRIDE``, ``path/to/key=json;…``.
         package_roots: The folders to search for packages, in this order.
         prefixes: The devel and install spaces of catkin in ``CMAKE_PREFIX_PATH``.
-        completion: ``ROSZ_COMPLETION_TIMEOUT``, the longest time in seconds that the TAB key waits;
-            0.5 when unset.
+        completion: ``ROSZ_COMPLETION_TIMEOUT``, the longest time in seconds that the TAB key waits
+            for the network; 0.5 when unset.
         console_format: ``ROSCONSOLE_FORMAT``.
         color: Whether terminals get colours; not with ``NO_COLOR`` or ``TERM=dumb``.
         home: ``ROS_HOME`` or ``~/.ros``.
@@ -98,7 +97,7 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
             UsageError: A variable has a value without a meaning.
         """
         env = os.environ if environ is None else environ
-        home = Path(env.get("ROS_HOME") or Path(env.get("HOME") or "/") / ".ros")
+        home = Path(env.get("ROS_HOME") or Path(env.get("HOME") or _home_of_user()) / ".ros")
         connect = _endpoints("ROSZ_CONNECT", env)
         listen = _endpoints("ROSZ_LISTEN", env)
         return cls(
@@ -124,6 +123,15 @@ class Environment(msgspec.Struct, frozen=True, kw_only=True):
         )
 
 
+def bag_limit() -> int:
+    """Return ``ROSZ_BAG_LIMIT``: the most bytes that a part of a bag may unpack to.
+
+    Raises:
+        UsageError: The variable has a value without a meaning.
+    """
+    return _number("ROSZ_BAG_LIMIT", os.environ, "a number of bytes") or _BAG_LIMIT
+
+
 def package_index(environment: Environment) -> PackageIndex:
     """Return the packages on the path, then those of pip-installed packages, rosz and Debian.
 
@@ -132,17 +140,13 @@ def package_index(environment: Environment) -> PackageIndex:
 
     Where there is a screen, Debian's rviz and rqt go before the pages that take their place.
     """
-    # Reading what is installed takes longer than most commands, and few need it.
+    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    # Reading the list of installed distributions takes longer than most commands do.
     return PackageIndex(
         lambda: [*environment.package_roots, *_registered_roots(), *_shipped_roots()],
         prefixes=environment.prefixes,
-        later=(SYSTEM, _WINDOWS) if _has_screen(os.environ) else (_WINDOWS, SYSTEM),
+        later=(SYSTEM, _WINDOWS) if screen else (_WINDOWS, SYSTEM),
     )
-
-
-def _has_screen(env: Mapping[str, str]) -> bool:
-    """Return whether programs can open windows."""
-    return any(env.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def _shipped_roots() -> list[Path]:
@@ -164,6 +168,16 @@ def _registered_roots() -> list[Path]:
         elif spec is not None and spec.origin:
             roots.append(Path(spec.origin).parent)
     return roots
+
+
+def _home_of_user() -> str:
+    """Return the home of the user by the password file, as of a service without ``HOME``."""
+    import pwd
+
+    try:
+        return pwd.getpwuid(os.geteuid()).pw_dir
+    except KeyError:  # a number without a name, as in containers
+        return "/"
 
 
 def _package_roots(env: Mapping[str, str], cwd: Path) -> tuple[Path, ...]:
@@ -213,8 +227,8 @@ def _rendezvous(text: str) -> str:
     folder = own / "rosz" if own.is_dir() else Path(f"/tmp/rosz-{user}")  # noqa: S108  # checked
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != user or found.st_mode & 0o077:
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != user or status.st_mode & 0o077:
         raise UsageError(
             f"ROSZ_RENDEZVOUS is '{_PRIVATE}', but '{folder}' is not a folder that only you can"
             f" enter; 'ls -ld {folder}' shows whose it is: remove it, or name another place,"

@@ -19,7 +19,8 @@ They have one root, so that ``except RoszError`` catches what rosz reports and n
     │   ├── EncodeError             a value does not fit its field
     │   └── DecodeError             received bytes are not a message of the type
     ├── TransportError              the session cannot open or communicate (also ConnectionError)
-    │   └── NoReplica               no process holds the parameter store
+    │   ├── NoReplica               no process holds the parameter store
+    │   └── PanicError              Zenoh panicked in an operation
     ├── ClosedError                 the object has been closed or shut down
     ├── TimeMovedBackwards          ROS time was set back during a sleep
     ├── WaitTimeout                 an event did not happen in time (also TimeoutError)
@@ -30,6 +31,7 @@ They have one root, so that ``except RoszError`` catches what rosz reports and n
     │   ├── GoalFailed              the goal was aborted or canceled: status, result
     │   └── ServerSilent            the server does not answer: seconds
     ├── ParamError                  a parameter value or write is not allowed
+    │   └── PartlyWritten           a write is not kept everywhere: holders, reasons, slow
     ├── StoreError                  a file of parameters cannot be used
     ├── BagError                    a bag cannot be read or written: path, offset
     │   └── BagUnindexed            a bag has no index
@@ -45,7 +47,7 @@ Texts are lower case, quote the wrong value, and say what was expected and what 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 TYPE_CHECKING = False  # typing takes longer to import than everything else here
 if TYPE_CHECKING:
@@ -73,8 +75,10 @@ __all__ = (
     "NotFoundError",
     "PackageError",
     "PackageNotFound",
+    "PanicError",
     "ParamError",
     "ParamNotFound",
+    "PartlyWritten",
     "RoszError",
     "ServerSilent",
     "ServiceError",
@@ -91,6 +95,9 @@ __all__ = (
     "YamlError",
     "near_miss",
 )
+
+_SHOWN = 200
+"""Characters of a name that an error shows."""
 
 
 def near_miss(word: str, known: Iterable[str]) -> str:
@@ -128,7 +135,8 @@ class InvalidName(RoszError, ValueError):
     def __init__(self, name: str, reason: str) -> None:
         self.name = name
         self.reason = reason
-        super().__init__(f"'{name}' is not a valid name: {reason}")
+        shown = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}…"
+        super().__init__(f"'{shown}' is not a valid name: {reason}")
 
 
 class SourceError(RoszError):
@@ -296,6 +304,10 @@ class NoReplica(TransportError):
     """No process on this network holds the parameter store."""
 
 
+class PanicError(TransportError):
+    """Zenoh panicked in an operation, which has not been performed."""
+
+
 class ClosedError(RoszError):
     """The node, session, publisher or other object has been closed."""
 
@@ -380,6 +392,29 @@ class ServerSilent(ActionError):
 
 class ParamError(RoszError):
     """A parameter value or write that is not allowed."""
+
+
+class PartlyWritten(ParamError):
+    """A write that stands, but that some processes refuse or cannot store.
+
+    It is not undone: what others wrote meanwhile may build on it.
+
+    Attributes:
+        what: The parameters, as shown to users.
+        holders: Number of other processes that acknowledged it.
+        reasons: Reason of each process that does not keep it, as shown to users.
+        slow: Processes that did not answer in time, as shown to users.
+    """
+
+    def __init__(
+        self, what: str, holders: int, reasons: Mapping[str, str], slow: Iterable[str] = ()
+    ) -> None:
+        self.what: str = what
+        self.holders: int = holders
+        self.reasons: dict[str, str] = dict(reasons)
+        self.slow: tuple[str, ...] = tuple(slow)
+        where = "; ".join(f"not kept at {who}: {why}" for who, why in sorted(reasons.items()))
+        super().__init__(f"{what} is written, but {where}")
 
 
 class StoreError(RoszError):

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from types import FrameType, TracebackType
     from typing import Any
 
-__all__ = ("InterruptDeferral", "is_interactive", "raise_deferred")
-
 _SAME_SIGNAL = 0.1
 """Seconds in which a second signal counts as the first: timeout(1) signals the group as well."""
 

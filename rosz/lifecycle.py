@@ -2,9 +2,9 @@
 
 An owner has a `Lifecycle` and closes itself with it::
 
-    class Feed:
+    class Recorder:
         def __init__(self) -> None:
-            self._lifecycle = Lifecycle("the feed", on_fork=self._forked)
+            self._lifecycle = Lifecycle("the recorder", on_fork=self._forked)
 
         def close(self) -> None:
             self._lifecycle.close(self._finish)
@@ -27,11 +27,9 @@ import signal
 import threading
 import weakref
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Protocol, Self, TypeVar
 
 from rosz.errors import ClosedError
-
-__all__ = ("FORKED", "Closable", "Hook", "Lifecycle", "Registration")
 
 FORKED = (
     "this process was forked from one that uses rosz, and threads and links do not outlive a fork:"
@@ -53,6 +51,22 @@ class Closable(Protocol):
 
     def close(self) -> None:
         """Close it; closing it again is not an error."""
+
+
+class Closing:
+    """A base class for what a ``with`` statement closes at its end."""
+
+    __slots__ = ()
+
+    def close(self) -> None:
+        """Close it; closing it again is not an error."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
 
 
 P = TypeVar("P", bound=Closable)

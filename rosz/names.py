@@ -2,6 +2,9 @@
 
 A name is *global* (``/a/b``), *relative* (``a/b``), *private* (``~a``) or *base* (``a``).
 Relative names are resolved in the namespace of a node, private ones in the name of the node.
+
+All limits of length are here. Zenoh 1.10 panics, with its locks held, when a message with a key of
+more than 65 535 bytes is sent; the limit of a key leaves room for what stands beside it.
 """
 
 from __future__ import annotations
@@ -12,11 +15,15 @@ from collections.abc import Mapping
 from rosz.errors import InvalidName
 
 __all__ = (
+    "LONGEST_KEY",
+    "LONGEST_NAME",
+    "LONGEST_PATH",
     "anonymous",
     "basename",
     "canonical",
     "check",
     "check_base",
+    "check_length",
     "check_resource",
     "is_global",
     "is_of_action",
@@ -29,6 +36,13 @@ __all__ = (
     "short_type",
 )
 
+LONGEST_NAME = 1024
+"""Largest number of bytes of a name or a type."""
+LONGEST_PATH = 4096
+"""Largest number of bytes of the name of a parameter."""
+LONGEST_KEY = 32768
+"""Largest number of bytes of a key expression of Zenoh."""
+
 _VALID = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*", re.ASCII)
 _BASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 _PART = re.compile(r"[A-Za-z0-9_/]", re.ASCII)
@@ -37,7 +51,21 @@ _LOGS = ("/rosout", "/rosout_agg")
 
 def is_valid(name: str) -> bool:
     """Return whether a text is a legal graph resource name; the empty one is."""
-    return not name or (_VALID.fullmatch(name) is not None and "//" not in name)
+    return not name or (
+        len(name) <= LONGEST_NAME and _VALID.fullmatch(name) is not None and "//" not in name
+    )
+
+
+def check_length(name: str, limit: int = LONGEST_NAME) -> str:
+    """Return the name if it is not too long.
+
+    Raises:
+        InvalidName: It has more bytes than the limit.
+    """
+    size = len(name.encode(errors="surrogatepass"))
+    if size > limit:
+        raise InvalidName(name, f"it has {size} bytes; the limit is {limit}")
+    return name
 
 
 def check(name: str) -> str:
@@ -48,6 +76,7 @@ def check(name: str) -> str:
     """
     if is_valid(name):
         return name
+    check_length(name)
     if "//" in name:
         raise InvalidName(name, "it has an empty part ('//')")
     if not re.match(r"[~/A-Za-z]", name):
@@ -64,7 +93,7 @@ def check_base(name: str) -> str:
     Raises:
         InvalidName: It is not legal.
     """
-    if _BASE.fullmatch(name):
+    if _BASE.fullmatch(check_length(name)):
         return name
     if not name:
         raise InvalidName(name, "it is empty")
@@ -78,11 +107,11 @@ def check_resource(name: str) -> str:
     """Return a resolved name unless it is the root, which no topic or service can have.
 
     Raises:
-        InvalidName: The name is the root.
+        InvalidName: The name is the root, or too long.
     """
     if name == "/":
         raise InvalidName(name, "it is the root namespace; expected the name of something in it")
-    return name
+    return check_length(name)
 
 
 def is_global(name: str) -> bool:
@@ -136,7 +165,7 @@ def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> st
         remaps: Remappings from resolved name to resolved name.
 
     Raises:
-        InvalidName: ``name`` is not legal.
+        InvalidName: ``name`` is not legal, or too long once it is resolved.
     """
     check(name)
     if not name:
@@ -147,6 +176,7 @@ def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> st
         resolved = canonical(f"{node}/{name[1:]}")
     else:
         resolved = canonical(namespace(node) + name)
+    check_length(resolved)
     return remaps.get(resolved, resolved) if remaps else resolved
 
 

@@ -25,18 +25,6 @@ import msgspec
 
 from rosz.errors import ExecutableNotFound, NotFoundError, PackageError, PackageNotFound, near_miss
 
-__all__ = (
-    "MANIFEST",
-    "ROSBUILD_MANIFEST",
-    "SYSTEM",
-    "Package",
-    "PackageIndex",
-    "crawl",
-    "is_python",
-    "manifest_of",
-    "start_words",
-)
-
 MANIFEST = "package.xml"
 ROSBUILD_MANIFEST = "manifest.xml"
 """The file of rosbuild's packages, which have the names of their folders."""
@@ -47,6 +35,7 @@ _SPACES = ("devel", "devel_isolated", "install", "install_isolated")
 """Folders beside a workspace's sources that builds write to."""
 SYSTEM = Path("/usr/share")
 """Where Debian has its packages, side by side with those that are none of ROS."""
+# Linux looks for the interpreter in as many bytes of a script (BINPRM_BUF_SIZE).
 _SHEBANG_BYTES = 256
 _COMMENT = re.compile(r"#.*")
 _INSTALLED = re.compile(
@@ -124,22 +113,22 @@ class Package(msgspec.Struct, frozen=True):
         Raises:
             ExecutableNotFound: There is none, or the file is not executable.
         """
-        found = self.files(name)
-        scripts = self.installed_scripts() if found else []
-        for file in found:
+        files = self.files(name)
+        scripts = self.installed_scripts() if files else []
+        for file in files:
             if _is_executable(file) or file in scripts:
                 return file
         entry = self._entry_points().get(name)
         if entry is not None:
             return self._module_of(name, entry)
-        if found:
+        if files:
             raise ExecutableNotFound(
-                f"'{found[0]}' of package '{self.name}' is not executable; run: chmod +x {found[0]}"
+                f"'{files[0]}' of package '{self.name}' is not executable; run: chmod +x {files[0]}"
             )
-        known = self.executables()
-        listing = f"; it has {', '.join(known[:8])}" if known else "; it has no executables"
+        executables = self.executables()
+        listing = f"; it has {', '.join(executables[:8]) or 'no executables'}"
         sources = [file.name for file in self._files() if file.suffix == ".py"]
-        hint = near_miss(name, known) or near_miss(name, sources) or listing
+        hint = near_miss(name, executables) or near_miss(name, sources) or listing
         raise ExecutableNotFound(
             f"package '{self.name}' ({self.path}) has no executable '{name}'{hint}"
         )
@@ -204,16 +193,16 @@ class Package(msgspec.Struct, frozen=True):
             NotFoundError: There is none or several, or the path leads out of the package.
         """
         direct = self.within(name)
-        known = dict.fromkeys([*([direct] if direct.is_file() else []), *self.files(name)])
-        found = [file for file in known if not _is_executable(file)] or list(known)
-        if len(found) > 1:
-            listing = ", ".join(map(str, found))
+        files = dict.fromkeys([*([direct] if direct.is_file() else []), *self.files(name)])
+        plain = [file for file in files if not _is_executable(file)] or list(files)
+        if len(plain) > 1:
+            listing = ", ".join(map(str, plain))
             raise NotFoundError(
-                f"package '{self.name}' has {len(found)} files named '{name}': {listing}; give the"
+                f"package '{self.name}' has {len(plain)} files named '{name}': {listing}; give the"
                 " path of one"
             )
-        if found:
-            return found[0]
+        if plain:
+            return plain[0]
         kin = [file.name for file in self._files() if file.suffix == Path(name).suffix]
         raise NotFoundError(
             f"package '{self.name}' ({self.path}) has no file '{name}'{near_miss(name, kin)}"
@@ -258,7 +247,7 @@ class PackageIndex:
 
     @cached_property
     def _crawled(self) -> tuple[dict[str, Package], list[PackageError]]:
-        known: dict[str, Package] = {}
+        packages: dict[str, Package] = {}
         broken: list[PackageError] = []
         for root in self.roots:
             # Of two packages of one name, the one nearer to the root wins.
@@ -269,8 +258,8 @@ class PackageIndex:
                     # A package that cannot be read does not hide the others, as in rospack.
                     broken.append(error)
                 else:
-                    known.setdefault(package.name, package)
-        return known, broken
+                    packages.setdefault(package.name, package)
+        return packages, broken
 
     def find(self, name: str) -> Package:
         """Return the package of a name.
@@ -360,35 +349,72 @@ def crawl(root: Path) -> Iterator[Path]:
 
 
 def _name_of(folder: Path) -> str:
-    """Return the name of the package in a folder."""
-    if not (folder / MANIFEST).is_file() and (folder / ROSBUILD_MANIFEST).is_file():
+    if manifest_of(folder) == folder / ROSBUILD_MANIFEST:
         return folder.name
-    return _name_in(folder / MANIFEST)
+    top = parse_manifest(folder / MANIFEST)
+    name = "".join(tag.text for tag in top.all("name")).strip()
+    if top.name != "package" or not name:
+        reason = "expected <package> with a <name> in it"
+        raise PackageError(reason, str(folder / MANIFEST))
+    return name
 
 
-def _name_in(manifest: Path) -> str:
+class ManifestTag(msgspec.Struct):
+    """A tag of a manifest.
+
+    Attributes:
+        name: Name of the tag.
+        attributes: Its attributes.
+        line: 1-based line.
+        column: 1-based column.
+        text: Text in it and in the tags in it.
+        tags: The tags in it.
+    """
+
+    name: str
+    attributes: dict[str, str]
+    line: int
+    column: int
+    text: str = ""
+    tags: list[ManifestTag] = []
+
+    def all(self, name: str) -> list[ManifestTag]:
+        """Return the tags of a name in it."""
+        return [tag for tag in self.tags if tag.name == name]
+
+
+def parse_manifest(file: Path) -> ManifestTag:
+    """Return the outermost tag of a package.xml or manifest.xml.
+
+    Raises:
+        PackageError: The file cannot be read, or is not well-formed.
+    """
     # Expat itself, since an import hook looks for packages here: libraries that are built on expat
     # import modules that may be loading just now.
     from xml.parsers import expat
 
-    opened: list[str] = []
-    name: list[str] = []
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    opened = [ManifestTag("", {}, 0, 0)]
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        place = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
+        tag = ManifestTag(name, attributes, *place)
+        opened[-1].tags.append(tag)
+        opened.append(tag)
 
     def read(text: str) -> None:
-        if opened == ["package", "name"]:
-            name.append(text)
+        for tag in opened:
+            tag.text += text
 
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = lambda tag, _: opened.append(tag)
+    parser.StartElementHandler = start
     parser.EndElementHandler = lambda _: opened.pop()
     parser.CharacterDataHandler = read
     try:
-        parser.Parse(manifest.read_bytes(), True)
+        parser.Parse(file.read_bytes(), True)
     except expat.ExpatError as error:
         reason = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        raise PackageError(reason, str(manifest), error.lineno, error.offset + 1) from error
+        raise PackageError(reason, str(file), error.lineno, error.offset + 1) from error
     except OSError as error:
-        raise PackageError(f"cannot be read: {error.strerror}", str(manifest)) from error
-    if not "".join(name).strip():
-        raise PackageError("expected <package> with a <name> in it", str(manifest))
-    return "".join(name).strip()
+        raise PackageError(f"cannot be read: {error.strerror}", str(file)) from error
+    return opened[0].tags[0]

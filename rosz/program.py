@@ -1,8 +1,9 @@
 """Several programs in one process: each has its own command line and its own threads.
 
 A container (`rosz.ros1.container`) runs each of its programs on a thread. Threads that a program
-starts belong to it, so code on any thread can look up its program with `current`. What is one per
-process elsewhere, such as ``sys.argv`` and the node of rospy, is one per program there.
+starts belong to it, so code on any thread can look up its program with `current`. There each
+program has its own ``sys.argv``, its own node of rospy and so on, of which a process elsewhere has
+one.
 """
 
 from __future__ import annotations
@@ -16,8 +17,6 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import msgspec
-
-__all__ = ("Program", "ProgramSpec", "current", "own", "separate_programs", "within")
 
 T = TypeVar("T")
 
@@ -55,7 +54,7 @@ class Program:
 
     Attributes:
         folder: Folder from which its modules are imported first; empty for none.
-        values: What `own` keeps for it.
+        values: The values that `own` keeps for it.
         threads: The threads that it has started and that are alive.
     """
 
@@ -132,11 +131,11 @@ def own(make: Callable[[], T], outside: T) -> T:
     program = _local.program
     if program is None:
         return outside
-    found = program.values.get(make)
-    if found is None:
+    own_value = program.values.get(make)
+    if own_value is None:
         # Of two threads that make one, both get the first.
-        found = program.values.setdefault(make, make())
-    value: T = found
+        own_value = program.values.setdefault(make, make())
+    value: T = own_value
     return value
 
 

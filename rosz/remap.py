@@ -12,8 +12,6 @@ import msgspec
 
 from rosz import names
 
-__all__ = ("Arguments", "parse")
-
 
 class Arguments(msgspec.Struct, frozen=True):
     """The command line of a node, sorted by kind; texts are as written.
@@ -42,7 +40,7 @@ class Arguments(msgspec.Struct, frozen=True):
         """
         base = names.check_base(self.special.get("__name", name))
         ns = names.check(self.special.get("__ns", environment_namespace))
-        return names.canonical(f"/{ns}/{base}")
+        return names.check_length(names.canonical(f"/{ns}/{base}"))
 
     def resolved_remaps(self, node: str) -> Mapping[str, str]:
         """Return the remappings with both sides resolved for the node of a full name.

@@ -1,11 +1,9 @@
 """Replacements for the programs, packages and modules of ROS that rosz does not have.
 
-Shells, ``rosz run``, launch files and imports find here what they say of such a name.
+Shells, ``rosz run``, launch files and imports find here their answer to such a name.
 """
 
 from __future__ import annotations
-
-__all__ = ("COMMANDS", "instead_of")
 
 _NOTHING_TO_BUILD = "nothing needs building; 'rosz pkg check' looks for mistakes"
 _NOTHING_TO_INSTALL = "pip installs what a package imports; messages and rospy come with rosz"
@@ -73,17 +71,31 @@ _ALIASES = {
     "roswtf": "use 'rosz doctor'",
 }
 
+_MANIFEST = "rospkg.RosPack().get_manifest(PACKAGE) reads package.xml and manifest.xml"
+_STACKS = "rospkg.RosStack() finds the folders with a stack.xml"
+_SYSTEM = "platform.freedesktop_os_release() tells the system"
 _MODULES = {
+    "camera_info_manager.zoom_camera_info_manager": "make a"
+    " camera_info_manager.CameraInfoManager for each zoom, with a calibration file of its own",
+    "diagnostic_analysis": "'rosz bag export FILE --topic /diagnostics' writes tables",
+    "smclib": "put SMC's statemap.py beside the state machine that SMC generated, or use smach",
+    "rosbag.migration": "'rosz bag play' converts messages of older definitions where their fields"
+    " fit; rules (.bmr) are for ROS 1's 'rosbag fix'",
     "moveit_commander": "it needs MoveIt, which is C++; " + _of_ros2("moveit_py"),
     "catkin": "rospkg.RosPack().get_path(PACKAGE) is the folder of a package",
     "launch": _LAUNCH,
     "launch_ros": _LAUNCH,
     "xacro": "run: pip install 'rosz[xacro]'",
+    "roslib.gentools": "a message class has _md5sum and _full_text",
+    "rosunit.xmlrunner": "rosunit.unitrun() writes results as JUnit XML",
+    **dict.fromkeys(("rospkg.distro", "rospkg.os_detect"), _SYSTEM),
+    **dict.fromkeys(("roslib.manifest", "roslib.manifestlib"), _MANIFEST),
+    **dict.fromkeys(("roslib.stack_manifest", "roslib.stacks"), _STACKS),
 }
 
 
 def instead_of(name: str) -> str:
-    """Return what to use instead of a program, package or module; empty if nothing is known.
+    """Return a replacement for a program, package or module; empty if none is known.
 
     Args:
         name: Name of the program, package or module.

@@ -2,13 +2,11 @@
 
 It is the same as ``python -m rosz.ros1``, but Ctrl-C ends the process without a traceback until the
 script begins: a traceback from an import of rosz would tell the script's author nothing.
-``--container`` in place of a script runs several; see `rosz.ros1.container`.
+``--container`` in place of a script runs several.
 """
 
 import signal
 import sys
-
-__all__ = ("main",)
 
 
 def main() -> None:
@@ -16,10 +14,6 @@ def main() -> None:
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    if sys.argv[1:2] == ["--container"]:
-        from rosz.ros1.container import main as run_several
-
-        sys.exit(run_several(sys.argv[2:], lambda: signal.signal(signal.SIGINT, before)))
     from rosz.ros1.__main__ import main as run
 
     run(sys.argv[1:], lambda: signal.signal(signal.SIGINT, before))

@@ -25,6 +25,7 @@ from rosz.idl import (
     Catalog,
     Definition,
     Folders,
+    SourceCache,
     action_of,
     action_type,
     class_name,
@@ -34,9 +35,9 @@ from rosz.idl import (
     is_service_message,
     split_definitions,
 )
-from rosz.idl.cache import SourceCache
 from rosz.idl.generate import MARKER, generate, module_source, shipped_module
 from rosz.message import Action, Message, Service
+from rosz.names import check_length
 from rosz.packages import PackageIndex
 
 __all__ = ("Kind", "TypeStore", "is_generated", "shipped_packages", "shipped_types")
@@ -67,7 +68,7 @@ class TypeStore:
 
     def __init__(self, packages: PackageIndex | None = None, cache: Path | None = None) -> None:
         self._packages = packages
-        self._compiler = _Compiler(cache)
+        self._compiler = _ModuleCompiler(cache)
         self._modules: dict[tuple[str, Kind], ModuleType] = {}
         self._folders = Folders(self._folder)
         self._catalog = Catalog(self.definition)
@@ -165,7 +166,7 @@ class TypeStore:
             DefinitionError: A definition is not well-formed, or a type in it does not exist.
         """
         full = self._check_name(name, "action")
-        texts = {full_name(other, "msg"): one for other, one in others.items()}
+        texts = {full_name(other, "msg"): body for other, body in others.items()}
         return _TextTypes(self, self._compiler, {full: text, **texts}).action(full)
 
     def names(self, kind: Kind, package: str | None = None) -> list[str]:
@@ -186,11 +187,11 @@ class TypeStore:
 
     def packages(self, kind: Kind | None = None) -> list[str]:
         """Return the names of all packages that have types, or types of one kind, sorted."""
-        known = set(shipped_packages())
+        names = set(shipped_packages())
         if self._packages is not None:
-            known |= set(self._packages.names())
+            names |= set(self._packages.names())
         kinds = _KINDS if kind is None else (kind,)
-        return sorted(p for p in known if any(self._bases(p, each) for each in kinds))
+        return sorted(p for p in names if any(self._bases(p, each) for each in kinds))
 
     def has(self, package: str, kind: Kind) -> bool:
         """Return whether a package has types of a kind."""
@@ -288,8 +289,8 @@ class TypeStore:
         return cls
 
     def _check_name(self, name: str, kind: Kind) -> str:
-        """Return the full name of a type of a kind, or of what is made of an action or service."""
-        match = _NAME.fullmatch(name)
+        """Return the full name of a type of a kind, or of one made of an action or a service."""
+        match = _NAME.fullmatch(check_length(name))
         if match is not None:
             full = f"{match[1]}/{match[2] or kind}/{match[3]}"
             place = "msg" if is_service_message(full) else match[2]
@@ -345,7 +346,7 @@ class TypeStore:
         return compiled
 
     def _from_text(self, name: str, text: str, others: Mapping[str, str] | None) -> Any:
-        texts = {full_name(other, "msg"): one for other, one in (others or {}).items()}
+        texts = {full_name(other, "msg"): body for other, body in (others or {}).items()}
         texts |= split_definitions(name, text)
         return _TextTypes(self, self._compiler, texts).find(name)
 
@@ -389,12 +390,8 @@ class TypeStore:
         )
 
 
-class _Compiler:
-    """Generates modules of classes, and runs them.
-
-    Args:
-        cache: Folder for generated sources; None to keep them in memory only.
-    """
+class _ModuleCompiler:
+    """Generates modules of classes, and runs them."""
 
     def __init__(self, cache: Path | None) -> None:
         self._cache = SourceCache(cache)
@@ -425,11 +422,11 @@ class _Compiler:
             message: Function that returns the class of a message type in the definitions.
             write: Function that generates the source.
         """
-        known = sys.modules.get(module_name)
-        stem_known, needs_known = getattr(known, "_made_of", ("", {}))
+        loaded = sys.modules.get(module_name)
+        stem_known, needs_known = getattr(loaded, "_made_of", ("", {}))
         same = stem_known == stem and all(message(n) is cls for n, cls in needs_known.items())
-        if known is not None and same:
-            return known
+        if loaded is not None and same:
+            return loaded
         needs: dict[str, type[Message]] = {}
 
         def type_of(name: str, type_hash: str, md5: str) -> type[Message]:
@@ -446,7 +443,7 @@ class _Compiler:
 
     @cached_property
     def _generation(self) -> bytes:
-        """A hash of the generator and of what generated code calls."""
+        """A hash of the generator and of the functions that generated code calls."""
         import hashlib
 
         digest = hashlib.sha256()
@@ -464,7 +461,7 @@ class _TextTypes:
     definitions.
     """
 
-    def __init__(self, store: TypeStore, compiler: _Compiler, texts: dict[str, str]) -> None:
+    def __init__(self, store: TypeStore, compiler: _ModuleCompiler, texts: dict[str, str]) -> None:
         self._store = store
         self._compiler = compiler
         self._texts = texts
@@ -483,26 +480,26 @@ class _TextTypes:
 
     def action(self, name: str) -> type[Action]:
         """Return an action class."""
-        found: type[Action] = self._compile(name, self._all_texts(name))
-        return found
+        cls: type[Action] = self._compile(name, self._all_texts(name))
+        return cls
 
     def find(self, name: str) -> Any:
         """Return a message or service class; the store's own if its definition is the same."""
         wanted = identity(name, self._catalog)
         look = self._store.service if is_service(name) else self._store.message
         try:
-            known = look(name)
+            cls = look(name)
         except (TypeNotFound, DefinitionError):
-            known = None
-        if known is not None and (known._type_hash, known._md5sum) == wanted:
-            return known
+            cls = None
+        if cls is not None and (cls._type_hash, cls._md5sum) == wanted:
+            return cls
         return self._compile(name, self._all_texts(name))
 
     def _all_texts(self, name: str) -> dict[str, str]:
         """Return the texts of a type and of all types in it, by name."""
         texts = {name: self._find(name).text}
         for part in self._catalog.parts(name):
-            texts |= {one.name: one.text for one in self._catalog.below(part).values()}
+            texts |= {spec.name: spec.text for spec in self._catalog.below(part).values()}
         return texts
 
     def _compile(self, name: str, texts: dict[str, str]) -> Any:

@@ -24,9 +24,11 @@ from typing import Any, Generic, TypeVar
 from rosz.errors import ClosedError
 from rosz.program import Program, current, within
 
-__all__ = ("Worker", "lend_thread", "run_task", "start_thread")
-
 T = TypeVar("T")
+
+ENDING = threading.Event()
+"""Set when the interpreter is about to end. From then on errors on threads are not logged, since
+everything that they use is being closed."""
 
 _log = logging.getLogger("rosz.worker")
 _CLOSE_TIMEOUT = 2.0
@@ -95,7 +97,8 @@ def _lend(program: Program | None, task: Callable[[], object]) -> None:
             with within(program):
                 task()
         except Exception:  # noqa: BLE001  # the thread outlives what a task raises
-            _log.exception("a task on a thread that was lent failed")
+            if not ENDING.is_set():
+                _log.exception("a task on a thread that was lent failed")
         del program, task
         free.append(tasks)
         try:
@@ -252,7 +255,7 @@ class Worker(Generic[T]):
         return reached.wait(timeout)
 
     def close(self, timeout: float = _CLOSE_TIMEOUT) -> None:
-        """Handle what is queued, and end; a second call has no effect.
+        """Handle the queued items, and end; a second call has no effect.
 
         A worker with ``receive`` ends when that returns ``None``; this only waits for it.
 
@@ -297,7 +300,7 @@ class Worker(Generic[T]):
             try:
                 self._handle(item)
             except Exception as error:  # noqa: BLE001  # the thread outlives what a handler raises
-                if not (self.closed and isinstance(error, ClosedError)):
+                if not (ENDING.is_set() or (self.closed and isinstance(error, ClosedError))):
                     self._log.exception("%s: handling an item failed", self.name)
             finally:
                 if not single:

@@ -3,7 +3,8 @@
 Markers select a part of the tests: ``pytest -m hosts``, ``pytest -m "not system and not ros1"``.
 ``system`` (opens sessions or starts processes) and ``hosts`` (network namespaces) follow from the
 fixtures of a test and its folder. ``ros1`` (compares with real ROS 1) follows from a fixture that
-starts ROS 1; otherwise it is written in the file.
+starts ROS 1; otherwise it is written in the file. ``pure`` are the tests of the gate's first stage:
+those of `_PURE` that have none of the other marks.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 from network import TIMEOUT, Network
 
+from rosz.actions import ActionClient
 from rosz.message import Ros2Default
 from rosz.node import Client, Publisher, Subscription
-from rosz.node.action_client import ActionClient
 
 # Tests give the same result on a busy machine. ROSZ_EXAMPLES=20000 takes a night.
 settings.register_profile(
@@ -60,12 +61,16 @@ _HOSTS = Path(__file__).parent / "hosts"
 _SYSTEM = {"course", "faults", "hosts", "interop"}
 _ROS_1 = {"genpy", "ros", "ros1", "roslaunch"}
 """Fixtures that start real ROS 1."""
+_PURE = ("arch", "golden/test_api.py", "idl", "interfaces", "launch/plan", "msgs", "wire")
+_LONG = ("hosts", "faults", "course", "interop", "bridges", "web")
+"""Folders with long tests. They begin first, so that no worker has one left at the end."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests by what they need."""
+    """Mark tests by what they need, and put long ones first."""
     for item in items:
-        folder = item.path.relative_to(_HOSTS.parent).parts[0]
+        path = item.path.relative_to(_HOSTS.parent)
+        folder = path.parts[0]
         if folder == _HOSTS.name:
             item.add_marker(pytest.mark.hosts)
         fixtures = set(getattr(item, "fixturenames", ()))
@@ -73,6 +78,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.system)
         if fixtures & _ROS_1:
             item.add_marker(pytest.mark.ros1)
+        marks = {mark.name for mark in item.iter_markers()}
+        quick = len(path.parts) == 1 or any(path.is_relative_to(part) for part in _PURE)
+        if quick and not marks & {"hosts", "ros1", "system"}:
+            item.add_marker(pytest.mark.pure)
+    items.sort(key=_order)
+
+
+def _order(item: pytest.Item) -> int:
+    folder = item.path.relative_to(_HOSTS.parent).parts[0]
+    return _LONG.index(folder) if folder in _LONG else len(_LONG)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

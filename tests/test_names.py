@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,6 +9,7 @@ from oracle import real
 
 from rosz import names
 from rosz.errors import InvalidName
+from rosz.remap import Arguments
 
 VALID = ["", "a", "/", "/a", "a/b", "/a/b_1", "~a", "~", "~/a", "A9", "/a/"]
 INVALID = {
@@ -34,6 +37,34 @@ def test_invalid(name: str, reason: str) -> None:
     assert not names.is_valid(name)
     with pytest.raises(InvalidName, match=reason):
         names.check(name)
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        names.check,
+        names.check_base,
+        names.check_resource,
+        names.check_length,
+        lambda name: names.resolve(name, "/node"),
+        lambda name: names.resolve(name[:1000], "/" + name[:1000] + "/node"),
+        lambda name: Arguments(special={"__ns": name[:1000]}).node_name(name[:1000]),
+    ],
+)
+def test_names_that_are_too_long(check: Callable[[str], object]) -> None:
+    """Zenoh would panic, and with it end what uses its session."""
+    long = "x" * 66_000
+    with pytest.raises(InvalidName, match=r"it has \d+ bytes; the limit is 1024") as caught:
+        check(long)
+    assert len(str(caught.value)) < 300
+    assert not names.is_valid(long)
+
+
+def test_the_longest_name() -> None:
+    longest = "/" + "x" * (names.LONGEST_NAME - 1)
+    assert names.check(longest) == names.resolve(longest, "/node") == longest
+    with pytest.raises(InvalidName, match="it has 1026 bytes"):
+        names.check_length("é" * 513)
 
 
 @given(st.text())

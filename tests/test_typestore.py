@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rosz.errors import DefinitionError, PackageNotFound, TypeNotFound
+from rosz.errors import DefinitionError, InvalidName, PackageNotFound, TypeNotFound
 from rosz.message import Message, Service
 from rosz.msgs.geometry_msgs.msg import Point
 from rosz.msgs.std_msgs.msg import Header, String
@@ -361,6 +361,17 @@ def test_a_message_from_a_full_text() -> None:
     made = scan(Header(frame_id="map"), [beam(1.5, Point(1.0, 2.0, 3.0))])
     assert scan.from_cdr(made.to_cdr()) == made == pickle.loads(pickle.dumps(made))
     assert "MSG: other_msgs/Beam" in scan._full_text
+
+
+def test_names_of_types_that_are_too_long(tmp_path: Path) -> None:
+    types = TypeStore(cache=tmp_path)
+    longer_than_names_of_files = f"mine/N{'x' * 900}"
+    assert types.message_from_text(longer_than_names_of_files, "int32 a\n")(1)._type_name
+    for name in (f"mine/N{'x' * 66_000}", f"std_msgs/N{'x' * 66_000}"):
+        with pytest.raises(InvalidName, match="the limit is 1024"):
+            types.message_from_text(name, "int32 a\n")
+        with pytest.raises(InvalidName, match="the limit is 1024"):
+            types.message(name)
 
 
 def test_a_class_from_a_text_is_made_once(tmp_path: Path) -> None:

@@ -1,26 +1,90 @@
 """Actions: goals that take time, give feedback, can be cancelled and end with a result.
 
-The protocol is that of actionlib: five topics below the name of the action (``goal``, ``cancel``,
-``status``, ``feedback``, ``result``) and the goal states of ``actionlib_msgs/GoalStatus``. `types`
-holds the message classes of an action and the kinds of states, `client` sends goals, `server`
-receives them, and `simple_server` executes them one at a time. May import nodes and everything
-below them.
+There are two protocols. The protocol of ROS 2 has three services and two topics; it is part of
+nodes (`rosz.node.actions`). The protocol of actionlib has five topics. `ActionlibClient`,
+`ActionlibServer` and `SimpleActionServer` use it, and also reach programs of ROS 2
+(`translation`). A gateway connects programs that support different protocols. `listing` finds the
+actions of a network. This package may import nodes and everything below them. Names are imported
+on first use, so that commands start fast.
 """
 
-from rosz.actions.client import ActionClient, ClientGoal, CommState
-from rosz.actions.gateway import ActionGateway, ServiceGateway
-from rosz.actions.server import ActionServer, ServerGoal
-from rosz.actions.simple_server import SimpleActionServer
-from rosz.actions.types import ActionTypes
+from __future__ import annotations
+
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from rosz.actions.actionlib_client import ActionlibClient, ActionlibClientGoal
+    from rosz.actions.actionlib_server import ActionlibServer, ActionlibServerGoal
+    from rosz.actions.comm_state import CommState
+    from rosz.actions.gateway import ServiceGateway, TopicGateway
+    from rosz.actions.listing import (
+        ActionEntry,
+        action_type,
+        describe_action,
+        find_action,
+        list_actions,
+        view_of_action,
+        wait_for_action,
+    )
+    from rosz.actions.simple_server import SimpleActionServer
+    from rosz.actions.types import ActionTypes
+    from rosz.node.actions import (
+        FINAL,
+        RESULT,
+        SEND,
+        STATUS,
+        TERMINAL,
+        ActionClient,
+        ActionlibState,
+        ActionServer,
+        ClientGoal,
+        GoalState,
+        ServerGoal,
+    )
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "actionlib_client": "ActionlibClient ActionlibClientGoal",
+            "actionlib_server": "ActionlibServer ActionlibServerGoal",
+            "comm_state": "CommState",
+            "gateway": "ServiceGateway TopicGateway",
+            "listing": "ActionEntry action_type describe_action find_action list_actions"
+            " view_of_action wait_for_action",
+            "simple_server": "SimpleActionServer",
+            "types": "ActionTypes",
+            "rosz.node.actions": "FINAL RESULT SEND STATUS TERMINAL ActionClient ActionlibState"
+            " ActionServer ClientGoal GoalState ServerGoal",
+        },
+    )
 
 __all__ = (
+    "FINAL",
+    "RESULT",
+    "SEND",
+    "STATUS",
+    "TERMINAL",
     "ActionClient",
-    "ActionGateway",
+    "ActionEntry",
     "ActionServer",
     "ActionTypes",
+    "ActionlibClient",
+    "ActionlibClientGoal",
+    "ActionlibServer",
+    "ActionlibServerGoal",
+    "ActionlibState",
     "ClientGoal",
     "CommState",
+    "GoalState",
     "ServerGoal",
     "ServiceGateway",
     "SimpleActionServer",
+    "TopicGateway",
+    "action_type",
+    "describe_action",
+    "find_action",
+    "list_actions",
+    "view_of_action",
+    "wait_for_action",
 )

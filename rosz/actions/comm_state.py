@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 
-__all__ = ("CommState", "path")
-
 
 class CommState:
     """The states of a goal in a client."""
@@ -25,22 +23,25 @@ class CommState:
 
 _C, _S = CommState, GoalStatus
 _RESULT = _C.WAITING_FOR_RESULT
-_TO_ACTIVE: Mapping[int, tuple[int, ...]] = {
-    _S.ACTIVE: (_C.ACTIVE,),
-    _S.PREEMPTING: (_C.ACTIVE, _C.PREEMPTING),
-    _S.PREEMPTED: (_C.ACTIVE, _C.PREEMPTING, _RESULT),
-    _S.SUCCEEDED: (_C.ACTIVE, _RESULT),
-    _S.ABORTED: (_C.ACTIVE, _RESULT),
+_Paths = Mapping[int, tuple[int, ...]]
+_FROM_PREEMPTING: _Paths = {
+    _S.PREEMPTING: (),
+    _S.PREEMPTED: (_RESULT,),
+    _S.SUCCEEDED: (_RESULT,),
+    _S.ABORTED: (_RESULT,),
 }
-_TO_PREEMPTING: Mapping[int, tuple[int, ...]] = {
+_FROM_ACTIVE: _Paths = {
+    **_FROM_PREEMPTING,
+    _S.ACTIVE: (),
     _S.PREEMPTING: (_C.PREEMPTING,),
     _S.PREEMPTED: (_C.PREEMPTING, _RESULT),
-    _S.SUCCEEDED: (_C.PREEMPTING, _RESULT),
-    _S.ABORTED: (_C.PREEMPTING, _RESULT),
 }
+_TO_ACTIVE = {status: (_C.ACTIVE, *states) for status, states in _FROM_ACTIVE.items()}
+_TO_PREEMPTING = {status: (_C.PREEMPTING, *states) for status, states in _FROM_PREEMPTING.items()}
 _OVER = (_S.REJECTED, _S.RECALLED, _S.PREEMPTED, _S.SUCCEEDED, _S.ABORTED)
 
-_PATHS: Mapping[int, Mapping[int, tuple[int, ...]]] = {
+# ROS 1's own table (actionlib/action_client.py): a state that was missed is passed through.
+_PATHS: Mapping[int, _Paths] = {
     _C.WAITING_FOR_GOAL_ACK: {
         **_TO_ACTIVE,
         _S.PENDING: (_C.PENDING,),
@@ -55,13 +56,7 @@ _PATHS: Mapping[int, Mapping[int, tuple[int, ...]]] = {
         _S.RECALLING: (_C.RECALLING,),
         _S.RECALLED: (_C.RECALLING, _RESULT),
     },
-    _C.ACTIVE: {
-        _S.ACTIVE: (),
-        _S.PREEMPTING: (_C.PREEMPTING,),
-        _S.PREEMPTED: (_C.PREEMPTING, _RESULT),
-        _S.SUCCEEDED: (_RESULT,),
-        _S.ABORTED: (_RESULT,),
-    },
+    _C.ACTIVE: _FROM_ACTIVE,
     _RESULT: dict.fromkeys((_S.ACTIVE, *_OVER), ()),
     _C.WAITING_FOR_CANCEL_ACK: {
         **_TO_PREEMPTING,
@@ -77,21 +72,11 @@ _PATHS: Mapping[int, Mapping[int, tuple[int, ...]]] = {
         _S.RECALLING: (),
         _S.RECALLED: (_RESULT,),
     },
-    _C.PREEMPTING: {
-        _S.PREEMPTING: (),
-        _S.PREEMPTED: (_RESULT,),
-        _S.SUCCEEDED: (_RESULT,),
-        _S.ABORTED: (_RESULT,),
-    },
+    _C.PREEMPTING: _FROM_PREEMPTING,
     _C.DONE: dict.fromkeys(_OVER, ()),
 }
 
 
 def path(state: int, status: int) -> tuple[int, ...] | None:
-    """Return the states that a status of the server leads through; None if it cannot follow.
-
-    Args:
-        state: State of the client, a constant of `CommState`.
-        status: State from the server, a constant of GoalStatus.
-    """
+    """Return the states that a status of the server leads through; None if it cannot follow."""
     return _PATHS[state].get(status)

@@ -9,19 +9,15 @@ import threading
 from functools import partial
 from typing import Any
 
-from rosz.actions.client import ActionClient, ClientGoal
-from rosz.actions.ros2_client import Ros2Client
-from rosz.actions.ros2_server import Ros2Server
-from rosz.actions.server import ActionServer, ServerGoal
-from rosz.actions.types import RUNNING, ActionTypes
+from rosz.actions.actionlib_client import ActionlibClient, ActionlibClientGoal
+from rosz.actions.actionlib_server import ActionlibServer, ActionlibServerGoal
+from rosz.actions.translation import ActionlibToRos2, Ros2ToActionlib
+from rosz.actions.types import ActionTypes
 from rosz.errors import UsageError
 from rosz.message import Action
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
 from rosz.node import Node
-from rosz.node.action_server import ServerGoal as NativeGoal
-
-__all__ = ("ActionGateway", "ServiceGateway")
-
+from rosz.node.actions import RUNNING
 
 _ENDED = "the gateway to the server ended"
 
@@ -34,7 +30,7 @@ def _find_types(node: Node, action_type: type[Any]) -> tuple[ActionTypes, type[A
     return types, types.action
 
 
-class ActionGateway:
+class TopicGateway:
     """Receive goals by actionlib's topics, and hand them to a server of ROS 2.
 
     Args:
@@ -48,9 +44,9 @@ class ActionGateway:
 
     def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
         types, action = _find_types(node, action_type)
-        self._client = Ros2Client(node, name, types, action)
-        self._goals: dict[str, _Goal] = {}
-        self._server = ActionServer(
+        self._client = ActionlibToRos2(node, name, types, action)
+        self._goals: dict[str, _ForwardedGoal] = {}
+        self._server = ActionlibServer(
             node, name, action_type, self._receive, self._cancel, has_ros2=False
         )
 
@@ -68,20 +64,20 @@ class ActionGateway:
         self._server.stop()
         self._client.close()
 
-    def _receive(self, goal: ServerGoal) -> None:
-        followed = self._goals[goal.id.id] = _Goal(goal, self._goals)
+    def _receive(self, goal: ActionlibServerGoal) -> None:
+        followed = self._goals[goal.id.id] = _ForwardedGoal(goal, self._goals)
         self._client.send(followed, goal.message.goal)
 
-    def _cancel(self, goal: ServerGoal) -> None:
+    def _cancel(self, goal: ActionlibServerGoal) -> None:
         followed = self._goals.get(goal.id.id)
         if followed is not None:
             self._client.cancel(followed)
 
 
-class _Goal:
+class _ForwardedGoal:
     """A goal that the server of ROS 2 has."""
 
-    def __init__(self, goal: ServerGoal, goals: dict[str, _Goal]) -> None:
+    def __init__(self, goal: ActionlibServerGoal, goals: dict[str, _ForwardedGoal]) -> None:
         self.id: GoalID = goal.id
         self._goal = goal
         self._goals = goals
@@ -117,28 +113,28 @@ class _Goal:
 class ServiceGateway:
     """Receive goals by ROS 2's services, and hand them to a server that has actionlib's topics.
 
-    Args:
-        node: Node that has the services.
-        name: Full name of the action.
-        action_type: Class of the action, such as ``FibonacciAction``.
-
-    Raises:
-        UsageError: The class is not that of an action, or the action's definition is not found.
+    Arguments and errors are those of `TopicGateway`.
     """
 
     def __init__(self, node: Node, name: str, action_type: type[Any]) -> None:
         self._types, self._action = _find_types(node, action_type)
-        self._client = ActionClient(node, name, action_type, has_ros2=False)
+        self._client = ActionlibClient(node, name, action_type, has_ros2=False)
         self._lock = threading.Lock()
-        self._goals: dict[str, ClientGoal] = {}
-        self._server: Ros2Server | None = None
+        self._goals: dict[str, ActionlibClientGoal] = {}
+        self._server: Ros2ToActionlib | None = None
 
     def start(self) -> bool:
         """Begin to receive goals; return true."""
         client = self._client
         self._server = client.node.keep(
-            _Services(
-                client.node, client.name, self._types, self._action, self._receive, self._cancel
+            Ros2ToActionlib(
+                client.node,
+                client.name,
+                self._types,
+                self._action,
+                self._receive,
+                self._cancel,
+                remote=True,
             )
         )
         return True
@@ -172,12 +168,12 @@ class ServiceGateway:
         if self._server is not None:
             self._server.send_feedback(name, feedback)
 
-    def _follow(self, name: str, goal: ClientGoal) -> None:
+    def _follow(self, name: str, goal: ActionlibClientGoal) -> None:
         """Pass on a state that is not the end of the goal."""
         if goal.status.status in RUNNING | {GoalStatus.RECALLING}:
             self._update(name, goal.status.status, None)
 
-    def _finish(self, name: str, goal: ClientGoal) -> None:
+    def _finish(self, name: str, goal: ActionlibClientGoal) -> None:
         """Pass on the end of the goal."""
         lost = goal.status.status == GoalStatus.LOST
         self._update(name, GoalStatus.ABORTED if lost else goal.status.status, goal.result)
@@ -187,15 +183,3 @@ class ServiceGateway:
     def _update(self, name: str, status: int, result: Any) -> None:
         if self._server is not None:
             self._server.update(GoalStatus(GoalID(id=name), status), result)
-
-
-class _Services(Ros2Server):
-    """Hands goals to a server elsewhere, which decides about them when they are accepted."""
-
-    def accepts(self, goal: NativeGoal) -> bool:
-        """Return whether the goal has not ended, as is so for a new one."""
-        return not goal.done
-
-    def start(self, goal: NativeGoal) -> None:
-        """Hand an accepted goal to the server."""
-        self.hand_over(goal)

@@ -6,11 +6,10 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from rosz.actions.server import ActionServer
-from rosz.actions.types import RUNNING, run_callback
+from rosz.actions.actionlib_server import ActionlibServer
+from rosz.actions.types import run_callback
+from rosz.node.actions import RUNNING
 from rosz.worker import Worker
-
-__all__ = ("SimpleActionServer",)
 
 _CHECK_PERIOD = 0.2
 _SUPERSEDED = "This goal was canceled because another goal was received by the simple action server"
@@ -30,7 +29,6 @@ class SimpleActionServer:
 
     Attributes:
         action_server: The server.
-        execute_callback: As given.
         current_goal: Goal that was accepted last; None at first.
         next_goal: Goal that arrived last; None at first.
         new_goal: Whether the next goal waits to be accepted.
@@ -41,7 +39,7 @@ class SimpleActionServer:
     """
 
     def __init__(
-        self, server: ActionServer, execute: Callable[[Any], object] | None = None
+        self, server: ActionlibServer, execute: Callable[[Any], object] | None = None
     ) -> None:
         self.action_server: Any = server
         self.execute_callback: Callable[[Any], object] | None = execute
@@ -133,8 +131,8 @@ class SimpleActionServer:
 
     def _receive(self, goal: Any) -> None:
         with self.lock:
-            known = [one for one in (self.current_goal, self.next_goal) if _is_goal(one)]
-            if any(goal.id.stamp.to_nsec() < one.id.stamp.to_nsec() for one in known):
+            others = [other for other in (self.current_goal, self.next_goal) if _is_goal(other)]
+            if any(goal.id.stamp.to_nsec() < other.id.stamp.to_nsec() for other in others):
                 goal.cancel(text=_SUPERSEDED)
                 return
             older, self.next_goal = self.next_goal, goal
@@ -169,11 +167,8 @@ class SimpleActionServer:
         return None
 
     def _execute(self, goal: Any) -> None:
-        node, name, execute = (
-            self.action_server.node,
-            self.action_server.name,
-            self.execute_callback,
-        )
+        node, name = self.action_server.node, self.action_server.name
+        execute = self.execute_callback
         if execute is None:
             return
         try:

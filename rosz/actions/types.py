@@ -9,20 +9,8 @@ import msgspec
 
 from rosz.errors import ClosedError, TypeNotFound, UsageError
 from rosz.message import Action
-from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.node import Node
 from rosz.typestore import TypeStore
-
-__all__ = ("RUNNING", "TERMINAL", "ActionTypes", "publish", "run_callback")
-
-RUNNING = frozenset({GoalStatus.ACTIVE, GoalStatus.PREEMPTING})
-"""States of a goal that the server is executing."""
-
-TERMINAL = frozenset({
-    GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED,
-    GoalStatus.RECALLED, GoalStatus.LOST,
-})  # fmt: skip
-"""States that a goal never leaves."""
 
 
 class ActionTypes(msgspec.Struct, frozen=True):
@@ -84,12 +72,7 @@ def _find_action(action_type: type[Any], types: TypeStore) -> type[Action] | Non
 
 
 def publish(node: Node, publisher: Any, message: Any) -> None:
-    """Publish a message; after the shutdown of the node do nothing.
-
-    Raises:
-        EncodeError: A value does not fit its field.
-        ClosedError: The publisher is closed.
-    """
+    """Publish a message; after the shutdown of the node do nothing."""
     try:
         publisher.publish(message)
     except ClosedError:

@@ -6,33 +6,58 @@ with its header of four bytes, or ROS 1's layout, as the encoding of the channel
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+import os
+from bisect import bisect_left
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from itertools import zip_longest
 from pathlib import Path
-from typing import Literal, Protocol, Self, TypeAlias
+from typing import Any, Literal, NoReturn, Protocol, Self, TypeAlias, TypeVar
 
 import msgspec
 
-from rosz.errors import BagError
+from rosz.errors import BagError, UsageError
 from rosz.qos import QoS
 
-__all__ = (
-    "SMALL",
-    "Attachment",
-    "BagReader",
-    "BagWriter",
-    "Channel",
-    "Chunk",
-    "Compression",
-    "DamageReport",
-    "Entry",
-    "Payload",
-)
+T = TypeVar("T")
+R = TypeVar("R", bound=tuple[Any, ...])
 
 Compression: TypeAlias = Literal["none", "lz4", "zstd", "bz2"]
 Payload: TypeAlias = bytes | bytearray | memoryview
 
 SMALL = 1024
 """Size in bytes below which a copy of a payload costs less than a view of it, and keeps less."""
+
+
+@lru_cache
+def compression_library(name: str) -> Any:
+    """Return the library of a compression, ``lz4`` or ``zstd``.
+
+    Raises:
+        UsageError: It is not installed.
+    """
+    from importlib import import_module
+
+    try:
+        return import_module({"lz4": "lz4.frame", "zstd": "zstandard"}[name])
+    except ImportError as error:
+        raise UsageError(
+            f"the compression {name} needs a library: pip install 'rosz[bag]' ({error})"
+        ) from error
+
+
+class FileErrors:
+    """A context that raises the system's errors about a file as `BagError`, behind a text."""
+
+    def __init__(self, file: str | os.PathLike[str], text: str = "cannot write to it") -> None:
+        self._file = file
+        self._text = text
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, OSError):
+            raise BagError(f"{self._text}: {error.strerror or error}", str(self._file)) from error
 
 
 class Channel(msgspec.Struct, frozen=True):
@@ -64,7 +89,7 @@ class Channel(msgspec.Struct, frozen=True):
     @property
     def latched(self) -> bool:
         """Whether late joiners receive earlier messages."""
-        return any(one.latched for one in self.qos)
+        return any(qos.latched for qos in self.qos)
 
 
 class Entry(msgspec.Struct, frozen=True, gc=False):
@@ -121,8 +146,35 @@ class Attachment(msgspec.Struct, frozen=True):
     data: bytes
 
 
+def in_order(
+    spans: Iterable[tuple[int, int, T]], rows_of: Callable[[T], list[R]], *, reverse: bool
+) -> Iterator[list[R]]:
+    """Yield the rows of spans in order, in runs; those of spans that overlap are merged.
+
+    A span comes with its earliest and its latest stamp; a row begins with its stamp.
+    """
+    ordered = sorted(spans, key=lambda span: -span[1] if reverse else span[0])
+    waiting: list[R] = []
+    for (_, _, span), following in zip_longest(ordered, ordered[1:]):
+        waiting += rows_of(span)
+        waiting.sort()
+        if reverse:
+            cut = bisect_left(waiting, (following[1] + 1,)) if following else 0
+            yield waiting[cut:][::-1]
+            del waiting[cut:]
+        else:
+            cut = bisect_left(waiting, (following[0],)) if following else len(waiting)
+            yield waiting[:cut]
+            del waiting[:cut]
+
+
 DamageReport: TypeAlias = Callable[[BagError], object]
 """Function called with the error of each damaged part, which is then left out."""
+
+
+def refuse_damage(error: BagError) -> NoReturn:
+    """Raise the error of a damaged part, where nobody wants to read the rest."""
+    raise error
 
 
 class BagReader(Protocol):

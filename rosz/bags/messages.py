@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
-from rosz.bags.bag import Attachment, BagReader, BagWriter, Channel, Entry, Payload
+from rosz.bags.bag import (
+    Attachment,
+    BagReader,
+    BagWriter,
+    Channel,
+    Entry,
+    Payload,
+)
+from rosz.bags.formats.events import event_definition
 from rosz.errors import DefinitionError, TypeNotFound
+from rosz.lifecycle import Closing
 from rosz.message import Message
 
 if TYPE_CHECKING:
     from rosz.typestore import TypeStore  # slow to import: see `rosz.bags.opening.open`
-
-__all__ = ("Bag", "BagMessage", "BagOutput", "class_of", "decoder_of")
 
 _PARSED = frozenset({"", "ros1msg", "ros2msg"})
 
@@ -31,13 +38,14 @@ def class_of(channel: Channel, types: TypeStore) -> type[Message]:
     """
     if channel.encoding == "ros1" and channel.md5:
         try:
-            known = types.message(channel.type)
+            local = types.message(channel.type)
         except (TypeNotFound, DefinitionError):
-            known = None
-        if known is not None and known._md5sum == channel.md5:
-            return known  # with what ROS 2 has added to the type
+            local = None
+        if local is not None and local._md5sum == channel.md5:
+            return local  # with what ROS 2 has added to the type
     if channel.definition and channel.language in _PARSED:
-        return types.message_from_text(channel.type, channel.definition)
+        text = event_definition(channel.type, channel.definition)
+        return types.message_from_text(channel.type, text)
     return types.message(channel.type)
 
 
@@ -90,15 +98,12 @@ class BagMessage:
         return message
 
 
-class Bag:
+class Bag(Closing):
     """A bag that is read.
 
     Args:
         reader: Reader of its format.
         types: Types for channels without a definition.
-
-    Attributes:
-        reader: As given.
     """
 
     def __init__(self, reader: BagReader, types: TypeStore) -> None:
@@ -114,7 +119,9 @@ class Bag:
     @property
     def topics(self) -> dict[str, str]:
         """The types of the topics by name, sorted."""
-        return dict(sorted({one.topic: one.type for one in self.reader.channels}.items()))
+        return dict(
+            sorted({channel.topic: channel.type for channel in self.reader.channels}.items())
+        )
 
     @property
     def start(self) -> int:
@@ -136,7 +143,9 @@ class Bag:
         if topics is None:
             return self.reader.count()
         wanted = {topics} if isinstance(topics, str) else set(topics)
-        return sum(self.reader.count(one) for one in self.channels if one.topic in wanted)
+        return sum(
+            self.reader.count(channel) for channel in self.channels if channel.topic in wanted
+        )
 
     def messages(
         self,
@@ -184,23 +193,14 @@ class Bag:
         """Close the file; a second call has no effect."""
         self.reader.close()
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(self, *exc_info: object) -> None:
-        self.close()
-
-
-class BagOutput:
+class BagOutput(Closing):
     """A bag that is written.
 
     Args:
         writer: Writer of its format.
         now: Function that returns the time of messages without a stamp.
         to_ros1: Function that translates channels, for a bag that holds ROS 1's layout.
-
-    Attributes:
-        writer: As given.
     """
 
     def __init__(
@@ -249,9 +249,3 @@ class BagOutput:
             BagError: The file cannot be written.
         """
         self.writer.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc_info: object) -> None:
-        self.close()

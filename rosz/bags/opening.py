@@ -10,26 +10,15 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
 
-from rosz.bags.bag import BagReader, BagWriter, Compression
-from rosz.bags.mcap_records import MAGIC
+from rosz.bags.bag import BagReader, BagWriter, Compression, FileErrors
+from rosz.bags.formats.mcap_records import MAGIC
 from rosz.errors import BagError, UsageError
 
 if TYPE_CHECKING:
-    from rosz.bags.chunk_writer import ChunkWriter
+    from rosz.bags.formats.chunk_writer import ChunkWriter
+    from rosz.bags.formats.rosbag2_reader import Storage
     from rosz.bags.messages import Bag, BagOutput
-    from rosz.bags.rosbag2_reader import Storage
     from rosz.typestore import TypeStore
-
-__all__ = (
-    "ACTIVE",
-    "FORMATS",
-    "create_file",
-    "create_writer",
-    "find_format",
-    "form_of",
-    "open",
-    "open_reader",
-)
 
 _MOST_MAGIC = 16
 _SQLITE = b"SQLite format 3"
@@ -50,11 +39,8 @@ def find_format(path: str | os.PathLike[str]) -> str:
     """
     if Path(path).is_dir():
         return "rosbag2"
-    try:
-        with Path(path).open("rb") as file:
-            magic = file.read(_MOST_MAGIC)
-    except OSError as error:
-        raise BagError(f"cannot open it: {error.strerror}", str(path)) from error
+    with FileErrors(path, "cannot open it"), Path(path).open("rb") as file:
+        magic = file.read(_MOST_MAGIC)
     if magic.startswith(MAGIC):
         return "mcap"
     if magic.startswith(b"#ROS"):
@@ -62,7 +48,7 @@ def find_format(path: str | os.PathLike[str]) -> str:
     if magic.startswith(_SQLITE):
         return "rosbag2"
     if not magic:
-        from rosz.bags.ros1_records import describe_begin
+        from rosz.bags.formats.ros1_records import describe_begin
 
         raise BagError(describe_begin(magic), str(path), 0)
     raise BagError(
@@ -82,14 +68,14 @@ def open_reader(path: str | os.PathLike[str]) -> BagReader:
     """
     kind = find_format(path)
     if kind == "rosbag":
-        from rosz.bags.ros1_reader import Ros1Reader
+        from rosz.bags.formats.ros1_reader import Ros1Reader
 
         return Ros1Reader(path)
     if kind == "rosbag2":
-        from rosz.bags.rosbag2_reader import Rosbag2Reader, SqliteReader
+        from rosz.bags.formats.rosbag2_reader import Rosbag2Reader, SqliteReader
 
         return Rosbag2Reader(path) if Path(path).is_dir() else SqliteReader(path)
-    from rosz.bags.mcap_reader import McapReader
+    from rosz.bags.formats.mcap_reader import McapReader
 
     return McapReader(path)
 
@@ -118,7 +104,7 @@ def create_writer(
     """
     kind = form or form_of(path)
     if kind == "rosbag2":
-        from rosz.bags.rosbag2_writer import Rosbag2Writer
+        from rosz.bags.formats.rosbag2_writer import Rosbag2Writer
 
         return Rosbag2Writer(path, storage=storage, compression=compression)
     if kind not in FORMATS:
@@ -129,10 +115,10 @@ def create_writer(
 def _writer_of(kind: str) -> type[ChunkWriter]:
     """Return the class that writes a format of one file."""
     if kind == "rosbag":
-        from rosz.bags.ros1_writer import Ros1Writer
+        from rosz.bags.formats.ros1_writer import Ros1Writer
 
         return Ros1Writer
-    from rosz.bags.mcap_writer import McapWriter
+    from rosz.bags.formats.mcap_writer import McapWriter
 
     return McapWriter
 
@@ -161,7 +147,6 @@ def create_file(
     compression: Compression = "none",
     replace: bool = False,
     chunk_size: int = 768 << 10,
-    capacity: int = 64 << 20,
     checksums: bool = True,
 ) -> ChunkWriter:
     """Create a bag that is a file; the suffix of the path tells the format.
@@ -171,7 +156,6 @@ def create_file(
         compression: Name of the compression.
         replace: Whether a file that exists is replaced; otherwise it is an error.
         chunk_size: Bytes of messages that are written, and compressed, together.
-        capacity: Bytes that may wait for the disk.
         checksums: Whether chunks have checksums, in a format that has them.
 
     Raises:
@@ -186,7 +170,6 @@ def create_file(
         compression=compression,
         replace=replace,
         chunk_size=chunk_size,
-        capacity=capacity,
         checksums=checksums,
     )
 
@@ -226,14 +209,14 @@ def open(  # noqa: A001
     from rosz.bags.messages import Bag, BagOutput
 
     if mode == "r":
-        from rosz.typestore import TypeStore  # slow to import, and what is in a bag needs no types
+        from rosz.typestore import TypeStore  # slow to import, and most bags hold their definitions
 
         return Bag(open_reader(path), types or TypeStore())
     writer = create_writer(path, compression=compression, replace=mode == "w")
     if writer.format != "rosbag":
         return BagOutput(writer, time.time_ns)
-    from rosz.bags.ros1_form import to_ros1
+    from rosz.bags.formats.ros1_form import to_ros1
     from rosz.typestore import TypeStore
 
-    known = types or TypeStore()
-    return BagOutput(writer, time.time_ns, lambda channel: to_ros1(channel, known)[0])
+    store = types or TypeStore()
+    return BagOutput(writer, time.time_ns, lambda channel: to_ros1(channel, store)[0])

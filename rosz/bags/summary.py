@@ -1,4 +1,4 @@
-"""What is in a bag, as ``rosbag info`` prints it: as text, and as YAML."""
+"""Summaries of bags, as text and as YAML, as ``rosbag info`` prints them."""
 
 from __future__ import annotations
 
@@ -10,18 +10,8 @@ from statistics import median
 import msgspec
 
 from rosz.bags.bag import BagReader
-from rosz.bags.ros1_reader import Ros1Reader
+from rosz.bags.formats.ros1_reader import Ros1Reader
 from rosz.names import short_type
-
-__all__ = (
-    "CompressionSummary",
-    "Summary",
-    "TopicSummary",
-    "find_frequencies",
-    "format_summary",
-    "format_yaml",
-    "summarize",
-)
 
 _NS = 1_000_000_000
 _BINARY = 1024.0
@@ -31,14 +21,7 @@ _FREQUENCIES = ("Hz", "kHz", "MHz", "GHz", "THz", "PHz", "EHz", "ZHz", "YHz")
 
 
 class CompressionSummary(msgspec.Struct, frozen=True):
-    """The chunks that are compressed in one way.
-
-    Attributes:
-        name: Name of the compression.
-        chunks: Number of chunks.
-        size: Bytes in the file.
-        uncompressed: Bytes of the records in them.
-    """
+    """The chunks that are compressed in one way: their number, and their bytes."""
 
     name: str
     chunks: int
@@ -47,14 +30,10 @@ class CompressionSummary(msgspec.Struct, frozen=True):
 
 
 class TopicSummary(msgspec.Struct, frozen=True):
-    """One topic.
+    """One topic: its type as ``pkg/Name``, and its numbers of messages and of channels.
 
-    Attributes:
-        topic: Full name.
-        type: ``pkg/Name``.
-        messages: Number of messages.
-        connections: Number of channels.
-        frequency: Messages per second, by the median of the times between them; None if unknown.
+    The frequency is in messages per second, by the median of the times between them; None if
+    unknown.
     """
 
     topic: str
@@ -65,7 +44,7 @@ class TopicSummary(msgspec.Struct, frozen=True):
 
 
 class Summary(msgspec.Struct, frozen=True):
-    """What is in a bag.
+    """A summary of a bag.
 
     Attributes:
         path: The bag.
@@ -97,7 +76,7 @@ class Summary(msgspec.Struct, frozen=True):
 
 
 def summarize(path: str, reader: BagReader, *, frequencies: bool = False) -> Summary:
-    """Return what is in a bag, by its index.
+    """Return the summary of a bag, by its index.
 
     Args:
         path: The bag, as it is to be shown.
@@ -148,10 +127,10 @@ def _compressions(reader: BagReader) -> list[CompressionSummary]:
     chunks: Counter[str] = Counter()
     sizes: Counter[str] = Counter()
     uncompressed: Counter[str] = Counter()
-    for one in reader.chunks:
-        chunks[one.compression] += 1
-        sizes[one.compression] += one.size
-        uncompressed[one.compression] += one.uncompressed
+    for chunk in reader.chunks:
+        chunks[chunk.compression] += 1
+        sizes[chunk.compression] += chunk.size
+        uncompressed[chunk.compression] += chunk.uncompressed
     order = sorted(chunks, key=lambda name: (chunks[name], name), reverse=True)
     return [
         CompressionSummary(name, chunks[name], sizes[name], uncompressed[name]) for name in order
@@ -159,11 +138,7 @@ def _compressions(reader: BagReader) -> list[CompressionSummary]:
 
 
 def find_frequencies(reader: BagReader) -> dict[str, float]:
-    """Return how often messages of each topic came, by the median of the times between them.
-
-    Raises:
-        BagError: A part of the bag is damaged.
-    """
+    """Return how often messages of each topic came, by the median of the times between them."""
     stamps: defaultdict[str, list[float]] = defaultdict(list)
     if isinstance(reader, Ros1Reader):
         for channel in reader.channels:
@@ -171,13 +146,13 @@ def find_frequencies(reader: BagReader) -> dict[str, float]:
     else:
         for entry in reader.messages():
             stamps[entry.channel.topic].append(_seconds(entry.stamp))
-    found = {}
+    frequencies = {}
     for topic, times in stamps.items():
         times.sort()
         period = median(second - first for first, second in pairwise(times)) if times[1:] else 0.0
         if period > 0:
-            found[topic] = 1 / period
-    return found
+            frequencies[topic] = 1 / period
+    return frequencies
 
 
 # As text.
@@ -237,18 +212,19 @@ def _frequency(value: float) -> str:
 
 
 def _compression_rows(summary: Summary) -> list[tuple[str, str]]:
-    total = sum(one.chunks for one in summary.compressions)
+    total = sum(compression.chunks for compression in summary.compressions)
     texts = []
-    for one in summary.compressions:
+    for compression in summary.compressions:
         percent = (
-            "" if one.name == "none" else f"; {100 * one.size / max(one.uncompressed, 1):.2f}%"
+            ""
+            if compression.name == "none"
+            else f"; {100 * compression.size / max(compression.uncompressed, 1):.2f}%"
         )
-        texts.append(f"{one.name} [{one.chunks}/{total} chunks{percent}]")
+        texts.append(f"{compression.name} [{compression.chunks}/{total} chunks{percent}]")
     rows = [("compression", ", ".join(texts) or "none")]
-    if all(one.name == "none" for one in summary.compressions):
+    if all(compression.name == "none" for compression in summary.compressions):
         return rows
-    before = sum(one.uncompressed for one in summary.compressions)
-    after = sum(one.size for one in summary.compressions)
+    before, after = _sizes(summary)
     width = max(len(_size(before)), len(_size(after)))
     if summary.duration <= 0:
         return [
@@ -266,6 +242,12 @@ def _compression_rows(summary: Summary) -> list[tuple[str, str]]:
     ]
 
 
+def _sizes(summary: Summary) -> tuple[int, int]:
+    """Return the bytes of all chunks without compression, and in the file."""
+    chunks = summary.compressions
+    return sum(each.uncompressed for each in chunks), sum(each.size for each in chunks)
+
+
 def _type_rows(summary: Summary) -> list[tuple[str, str]]:
     width = max(map(len, summary.types))
     texts = [f"{name:<{width}} [{md5}]" for name, md5 in summary.types.items()]
@@ -274,19 +256,21 @@ def _type_rows(summary: Summary) -> list[tuple[str, str]]:
 
 def _topic_rows(summary: Summary) -> list[tuple[str, str]]:
     topics = summary.topics
-    widest = max(len(one.topic) for one in topics)
-    digits = max(len(str(one.messages)) for one in topics)
+    widest = max(len(topic.topic) for topic in topics)
+    digits = max(len(str(topic.messages)) for topic in topics)
     type_width = max(map(len, summary.types))
-    shown = {one.topic: _frequency(one.frequency) for one in topics if one.frequency is not None}
+    shown = {
+        topic.topic: _frequency(topic.frequency) for topic in topics if topic.frequency is not None
+    }
     wide = max(map(len, shown.values()), default=0)
     rows = []
-    for number, one in enumerate(topics):
-        word = "msgs" if one.messages > 1 else "msg "
-        mark = "@" if one.topic in shown else " "
-        rate = f" {mark} {shown.get(one.topic, ''):>{wide}}"
-        more = f" ({one.connections} connections)" if one.connections > 1 else ""
-        text = f"{one.topic:<{widest}}   {one.messages:>{digits}} {word}{rate}"
-        rows.append(("" if number else "topics", f"{text} : {one.type:<{type_width}}{more}"))
+    for number, topic in enumerate(topics):
+        word = "msgs" if topic.messages > 1 else "msg "
+        mark = "@" if topic.topic in shown else " "
+        rate = f" {mark} {shown.get(topic.topic, ''):>{wide}}"
+        more = f" ({topic.connections} connections)" if topic.connections > 1 else ""
+        text = f"{topic.topic:<{widest}}   {topic.messages:>{digits}} {word}{rate}"
+        rows.append(("" if number else "topics", f"{text} : {topic.type:<{type_width}}{more}"))
     return rows
 
 
@@ -307,23 +291,21 @@ def format_yaml(summary: Summary) -> str:
         f"indexed: {summary.indexed}",
         f"compression: {summary.compressions[0].name if summary.compressions else 'none'}",
     ]
-    if any(one.name != "none" for one in summary.compressions):
-        lines += [
-            f"uncompressed: {sum(one.uncompressed for one in summary.compressions)}",
-            f"compressed: {sum(one.size for one in summary.compressions)}",
-        ]
+    if any(compression.name != "none" for compression in summary.compressions):
+        before, after = _sizes(summary)
+        lines += [f"uncompressed: {before}", f"compressed: {after}"]
     lines.append("types:")
     for name, md5 in summary.types.items():
         lines += [f"    - type: {name}", f"      md5: {md5}"]
     lines.append("topics:")
-    for one in summary.topics:
+    for topic in summary.topics:
         lines += [
-            f"    - topic: {one.topic}",
-            f"      type: {one.type}",
-            f"      messages: {one.messages}",
+            f"    - topic: {topic.topic}",
+            f"      type: {topic.type}",
+            f"      messages: {topic.messages}",
         ]
-        if one.connections > 1:
-            lines.append(f"      connections: {one.connections}")
-        if one.frequency is not None:
-            lines.append(f"      frequency: {one.frequency:.4f}")
+        if topic.connections > 1:
+            lines.append(f"      connections: {topic.connections}")
+        if topic.frequency is not None:
+            lines.append(f"      frequency: {topic.frequency:.4f}")
     return "\n".join([*lines, ""])

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-PUBLIC_MODULES = ("admission", "assets", "gate", "opening")
+PUBLIC_MODULES = ("assets",)
 
 __all__ = ()

@@ -10,8 +10,6 @@ from rosz.environment import Environment, package_index
 from rosz.errors import NotFoundError, UsageError
 from rosz.packages import PackageIndex
 
-__all__ = ("SHOWN", "Assets")
-
 SHOWN = (
     re.compile(
         r"package://(?:[-\w%]+/)*[-\w%.]+"

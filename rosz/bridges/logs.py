@@ -8,8 +8,6 @@ from rosz.msgs.rcl_interfaces.msg import Log as Ros2Log
 from rosz.msgs.rosgraph_msgs.msg import Log as Ros1Log
 from rosz.msgs.std_msgs.msg import Header
 
-__all__ = ("GATHERED", "LOGS", "is_log", "to_ros1_log", "to_ros2_log")
-
 LOGS = "/rosout"
 """The topic that nodes log to."""
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
-from rosz.cli.console import print_json, print_json_line, print_lines, print_result, until_stopped
+from rosz.cli.console import print_json_line, print_lines, print_result, until_stopped
 from rosz.cli.declare import Argument, Json, Option, seconds, values_last
+from rosz.errors import EncodeError, GoalFailed
 
 if TYPE_CHECKING:
-    from rosz.node.action_client import ActionClient
-    from rosz.node.goals import GoalState
-
-__all__ = ("app",)
+    from rosz.actions import ActionClient, GoalState
 
 app = new_group("List actions, and send goals to them.")
 
@@ -30,33 +29,33 @@ def list_command(
     json: Json = False,
 ) -> int:
     """List actions."""
-    from rosz.introspect.actions import list_actions
+    from rosz.actions import list_actions
 
-    found = list_actions(call.survey().view)
-    lines = (one.name + (f" [{', '.join(one.types)}]" if types else "") for one in found)
-    print_result(lines, found, as_json=json)
+    entries = list_actions(call.survey().view)
+    lines = (entry.name + (f" [{', '.join(entry.types)}]" if types else "") for entry in entries)
+    print_result(lines, entries, as_json=json)
     return int(call.incomplete)
 
 
 @app.command("info")
 def info_command(call: Call, action: _ActionName, *, json: Json = False) -> None:
     """Print the type, the servers and the clients of an action."""
-    from rosz.introspect.actions import describe_action
+    from rosz.actions import describe_action
 
-    found = describe_action(call.survey().view, call.resolve(action))
-    lines = [f"Action: {found.name}", f"Type: {', '.join(found.types)}"]
-    for title, nodes in (("servers", found.servers), ("clients", found.clients)):
+    entry = describe_action(call.survey().view, call.resolve(action))
+    lines = [f"Action: {entry.name}", f"Type: {', '.join(entry.types)}"]
+    for title, nodes in (("servers", entry.servers), ("clients", entry.clients)):
         lines += [f"Action {title}: {len(nodes)}", *(f"    {node}" for node in nodes)]
-    print_result(lines, found, as_json=json)
+    print_result(lines, entry, as_json=json)
 
 
 @app.command("type")
 def type_command(call: Call, action: _ActionName, *, json: Json = False) -> None:
     """Print the type of an action."""
-    from rosz.introspect.actions import describe_action
+    from rosz.actions import describe_action
 
-    found = describe_action(call.survey().view, call.resolve(action))
-    print_result(found.types, {"type": found.types[0]}, as_json=json)
+    entry = describe_action(call.survey().view, call.resolve(action))
+    print_result(entry.types, {"type": entry.types[0]}, as_json=json)
 
 
 @app.command("show")
@@ -67,13 +66,13 @@ def show_command(
     raw: Annotated[bool, Option("-r --raw", "Print it as written, with comments.")] = False,
 ) -> None:
     """Print an action type: goal, result and feedback, with the fields of the types in them."""
-    from rosz.introspect.definitions import Definitions
+    from rosz.introspect import Definitions
 
     definitions = Definitions(call.types, "action")
-    for one in definitions.find(name):
+    for type_name in definitions.find(name):
         if "/" not in name:
-            print_lines([f"[{one}]:"])
-        print_lines([definitions.text(one) if raw else definitions.show(one)])
+            print_lines([f"[{type_name}]:"])
+        print_lines([definitions.text(type_name) if raw else definitions.show(type_name)])
 
 
 @app.command("send", arrange=values_last("--timeout"))
@@ -99,11 +98,10 @@ def send_command(
     The exit code is 0 if the goal succeeded.
     """
     seconds("--timeout", timeout)
-    import rosz.message.convert  # noqa: F401  # used later; Ctrl-C must not interrupt an import
-    from rosz.introspect.actions import action_type, make_goal, view_of_action, wait_for_action
-    from rosz.introspect.arguments import read_arguments
+    from rosz.actions import GoalState, action_type, view_of_action, wait_for_action
+    from rosz.introspect import read_arguments
+    from rosz.message import to_jsonable  # noqa: F401  # used later; Ctrl-C must not interrupt an import
     from rosz.node import Node
-    from rosz.node.goals import GoalState
 
     arguments = read_arguments(values or ())
     state = GoalState.UNKNOWN
@@ -114,14 +112,22 @@ def send_command(
         with Node("rosz_action", anonymous=True, context=context) as node:
             kind = action_type(node, view, name)
             with node.action_client(name, kind) as client:
-                goal = make_goal(client, arguments, time.time_ns())
+                goal = _make_goal(kind.Goal, arguments)
                 state = _send(client, goal, timeout, feedback=feedback, as_json=json)
     return int(state is not GoalState.SUCCEEDED)
 
 
+def _make_goal(goal_type: type[Any], arguments: Sequence[Any]) -> Any:
+    from rosz.introspect import make_message, with_arguments
+
+    try:
+        return make_message(goal_type, arguments, time.time_ns())
+    except EncodeError as error:
+        raise with_arguments(error, goal_type) from error
+
+
 def _printer(as_json: bool) -> Any:
-    """Return a function that prints feedback."""
-    from rosz.message.convert import to_jsonable
+    from rosz.message import to_jsonable
 
     def show(message: Any) -> None:
         if as_json:
@@ -136,8 +142,7 @@ def _send(
     client: ActionClient, goal: Any, timeout: float, *, feedback: bool, as_json: bool
 ) -> GoalState:
     """Send a goal, wait for its end, and print its result; return the final state."""
-    from rosz.errors import GoalFailed
-    from rosz.message.convert import to_jsonable
+    from rosz.message import to_jsonable
 
     try:
         sent = client.send(goal, feedback=_printer(as_json) if feedback else None)
@@ -155,10 +160,9 @@ def _send(
         result = sent.result(0)
     except GoalFailed as error:
         result = error.result
-    if as_json:
-        print_json({"status": sent.status.text, "result": to_jsonable(result)})
-    else:
-        print_lines(["result:", _indented(result), f"goal {sent.status.text}"])
+    lines = ["result:", _indented(result), f"goal {sent.status.text}"]
+    row = {"status": sent.status.text, "result": to_jsonable(result)}
+    print_result(lines, row, as_json=as_json)
     return sent.status
 
 

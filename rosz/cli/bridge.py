@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, closing
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
+
+from msgspec import Struct
 
 from rosz.cli.console import print_lines, until_stopped
 from rosz.cli.core import open_master, read_master_place
 from rosz.cli.declare import App, Option, at_least
 from rosz.errors import UsageError
-
-__all__ = ("app",)
 
 app = App("Let programs that speak other protocols take part in the network.")
 
@@ -79,98 +79,96 @@ def ros1_command(
         if place is not None:
             lines = open_master(environment, *place, stack)
         else:
-            from rosz.bridges.ros1 import AttachedBridge, Choice
+            from rosz.bridges.ros1 import AttachedBridge, CrossingNames
 
-            choice = Choice(tuple(topics or ()), tuple(services or ()), tuple(params or ()))
+            names = CrossingNames(tuple(topics or ()), tuple(services or ()), tuple(params or ()))
             stack.enter_context(
-                AttachedBridge(master, environment, choice=choice, namespace=namespace)
+                AttachedBridge(master, environment, names=names, namespace=namespace)
             )
             lines = [f"joining the roscore at {master}"]
         _run(ready, lines)
 
 
-@app.command("websocket")
-def websocket_command(
-    *,
-    port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 9090,
-    listen: _Listen = "127.0.0.1",
-    password_file: _PasswordFile = "",
+class _WebsocketOptions(Struct, frozen=True, kw_only=True):
+    """The options of ``rosz bridge websocket``."""
+
+    port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 9090
+    listen: _Listen = "127.0.0.1"
+    password_file: _PasswordFile = ""
     origin: Annotated[
         list[str] | None,
         Option("--origin ORIGIN", "Pages that may connect, such as http://robot; repeatable."),
-    ] = None,
-    read_only: _ReadOnly = False,
-    topics: _Topics = None,
-    services: _Services = None,
-    params: _Params = None,
+    ] = None
+    read_only: _ReadOnly = False
+    topics: _Topics = None
+    services: _Services = None
+    params: _Params = None
     ros2: Annotated[
         bool, Option("--ros2", "Use ROS 2's spelling with clients that have not shown theirs.")
-    ] = False,
-    certificate: _Certificate = "",
-    key: _Key = "",
-) -> None:
+    ] = False
+    certificate: _Certificate = ""
+    key: _Key = ""
+
+
+@app.command("websocket")
+def websocket_command(options: _WebsocketOptions) -> None:
     """Serve the rosbridge protocol to web pages and other programs, until it is stopped."""
-    at_least("--port", port, 0, "as a port", _LAST_PORT)
-    from rosz.bridges.websocket import Settings, open_bridge
+    from rosz.bridges.rosbridge import RosbridgeSettings, open_bridge
     from rosz.node import Node
 
-    settings = Settings(
-        host=listen,
-        port=port,
-        password_file=password_file,
-        origins=tuple(origin or ()),
-        read_only=read_only,
-        topics=tuple(topics or ()),
-        services=tuple(services or ()),
-        params=tuple(params or ()),
-        spelling="ros2" if ros2 else "ros1",
-        certificate=certificate,
-        key=key,
-    )
+    settings = RosbridgeSettings(**_settings(options), spelling="ros2" if options.ros2 else "ros1")
     with until_stopped() as ready, Node("rosbridge_websocket", anonymous=True, argv=()) as node:
         bridge, lines = open_bridge(node, settings)
         with closing(bridge):
             _run(ready, lines)
 
 
-@app.command("foxglove")
-def foxglove_command(
-    *,
-    port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 8765,
-    listen: _Listen = "127.0.0.1",
-    password_file: _PasswordFile = "",
+class _FoxgloveOptions(Struct, frozen=True, kw_only=True):
+    """The options of ``rosz bridge foxglove``."""
+
+    port: Annotated[int, Option("-p --port PORT", "Port to listen at; 0 for any.")] = 8765
+    listen: _Listen = "127.0.0.1"
+    password_file: _PasswordFile = ""
     origin: Annotated[
         list[str] | None,
         Option("--origin ORIGIN", "Pages that may connect, beside Foxglove's; repeatable."),
-    ] = None,
-    read_only: _ReadOnly = False,
-    topics: _Topics = None,
-    services: _Services = None,
-    params: _Params = None,
-    certificate: _Certificate = "",
-    key: _Key = "",
-) -> None:
+    ] = None
+    read_only: _ReadOnly = False
+    topics: _Topics = None
+    services: _Services = None
+    params: _Params = None
+    certificate: _Certificate = ""
+    key: _Key = ""
+
+
+@app.command("foxglove")
+def foxglove_command(options: _FoxgloveOptions) -> None:
     """Serve Foxglove, Lichtblick and other viewers, until it is stopped."""
-    at_least("--port", port, 0, "as a port", _LAST_PORT)
-    from rosz.bridges.foxglove import Settings, open_bridge
+    from rosz.bridges.foxglove import FoxgloveSettings, open_bridge
     from rosz.node import Node
 
-    settings = Settings(
-        host=listen,
-        port=port,
-        password_file=password_file,
-        origins=tuple(origin or ()),
-        read_only=read_only,
-        topics=tuple(topics or ()),
-        services=tuple(services or ()),
-        params=tuple(params or ()),
-        certificate=certificate,
-        key=key,
-    )
+    settings = FoxgloveSettings(**_settings(options))
     with until_stopped() as ready, Node("foxglove_bridge", anonymous=True, argv=()) as node:
         bridge, lines = open_bridge(node, settings)
         with closing(bridge):
             _run(ready, lines)
+
+
+def _settings(options: _WebsocketOptions | _FoxgloveOptions) -> dict[str, Any]:
+    """Return the settings that both bridges have."""
+    at_least("--port", options.port, 0, "as a port", _LAST_PORT)
+    return {
+        "host": options.listen,
+        "port": options.port,
+        "password_file": options.password_file,
+        "origins": tuple(options.origin or ()),
+        "read_only": options.read_only,
+        "topics": tuple(options.topics or ()),
+        "services": tuple(options.services or ()),
+        "params": tuple(options.params or ()),
+        "certificate": options.certificate,
+        "key": options.key,
+    }
 
 
 def _run(ready: Callable[[], None], lines: list[str]) -> NoReturn:

@@ -9,22 +9,17 @@ from typing import TYPE_CHECKING
 from rosz import names, remap
 from rosz.cli.console import until_stopped, warn
 from rosz.cli.declare import App
-from rosz.environment import Environment
+from rosz.environment import Environment, package_index
 
 if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
+    from rosz.introspect import Survey
     from rosz.node import Context, Node
     from rosz.session import Session
     from rosz.typestore import TypeStore
 
-__all__ = ("Call", "new_group")
-
 
 class Call:
     """One call of a command.
-
-    Args:
-        argv: The remappings of the command line.
 
     Attributes:
         environment: The settings of this machine.
@@ -59,14 +54,13 @@ class Call:
     @property
     def types(self) -> TypeStore:
         """The message and service types."""
-        from rosz.environment import package_index
         from rosz.typestore import TypeStore
 
         return TypeStore(package_index(self.environment), self.environment.home / "rosz")
 
     def session(self) -> Session:
         """Open a session for a short query; warn of machines that it does not reach."""
-        from rosz.introspect.connect import open_session
+        from rosz.introspect import open_session
 
         session = open_session(self.environment)
         self._check_reached(session)
@@ -74,7 +68,7 @@ class Call:
 
     def context(self, *, lasting: bool = False) -> Context:
         """Open the context of a node, which may belong to a command that runs until stopped."""
-        from rosz.introspect.connect import open_context
+        from rosz.introspect import open_context
 
         context = open_context(self.environment, self.argv, lasting=lasting)
         if not lasting or self.environment.mode == "client":
@@ -82,7 +76,7 @@ class Call:
         return context
 
     def _check_reached(self, session: Session) -> None:
-        from rosz.introspect.connect import find_unreached
+        from rosz.introspect import find_unreached
 
         for endpoint, dialler in find_unreached(session, self.environment).items():
             self.incomplete = True
@@ -94,7 +88,7 @@ class Call:
     @contextmanager
     def lasting_node(self, tool: str) -> Iterator[Node]:
         """Open the node of a tool that runs until it is stopped."""
-        import rosz.introspect.subscribe  # noqa: F401  # used later; Ctrl-C must not interrupt an import
+        from rosz.introspect import subscribe_samples  # noqa: F401  # later; Ctrl-C must not interrupt it
         from rosz.node import Node
 
         with (
@@ -107,19 +101,15 @@ class Call:
 
     @contextmanager
     def session_and_survey(self, nodes: Collection[str] = ()) -> Iterator[tuple[Session, Survey]]:
-        """Open a session, and take a survey of the domain with its processes.
-
-        Args:
-            nodes: Full names of the nodes that are looked for.
-        """
-        from rosz.introspect.survey import take_survey
+        """Open a session; take a survey of the domain with processes, and the nodes looked for."""
+        from rosz.introspect import take_survey
 
         with self.session() as session:
             yield session, take_survey(session, self.domain, nodes=nodes, processes=True)
 
     def survey(self, *, processes: bool = False, dropped: bool = False) -> Survey:
         """Return the domain, with processes and counts of dropped samples if wanted."""
-        from rosz.introspect.survey import take_survey
+        from rosz.introspect import take_survey
 
         with self.session() as session:
             survey = take_survey(session, self.domain, processes=processes, dropped=dropped)

@@ -1,4 +1,4 @@
-"""The table of all commands: where each is declared, and what it is for."""
+"""The table of all commands: the module that declares each, and its purpose."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rosz.cli.declare import App
-
-__all__ = ("COMMANDS", "OLD_NAMES", "format_rows", "load")
 
 COMMANDS = {
     "launch": "start the nodes of a launch file",
@@ -54,7 +52,16 @@ OLD_NAMES = {
 }
 """ROS 1's names of commands; a command that is run by one has it in its help and its errors."""
 
-_APPS = {"msg": "types:msg", "srv": "types:srv", "help": "manual:app"}
+_APPS = {
+    "msg": "types:msg",
+    "srv": "types:srv",
+    "gen": "types:gen",
+    "graph": "pictures:graph",
+    "web": "system:web",
+    "doctor": "system:doctor",
+    "turtlesim": "pictures:turtlesim",
+    "help": "manual:app",
+}
 """Module and name of each app that is not ``app`` in the module named like its command."""
 
 

@@ -1,7 +1,8 @@
 """Complete a command line: ``rosz complete SHELL LINE``, which the TAB key of a shell runs.
 
-It prints one candidate per line, and nothing when there is no candidate, something fails or the
-time limit has passed. The candidates come from the declarations of the commands.
+It prints one candidate per line. It prints nothing if there is no candidate, or if an error occurs.
+Candidates from the network that do not arrive within the time limit are left out. The options come
+from the declarations of the commands.
 """
 
 from __future__ import annotations
@@ -9,20 +10,17 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from pathlib import Path
 
 from rosz.cli import suggest
 from rosz.cli.commands import COMMANDS, OLD_NAMES, load
-from rosz.cli.declare import Argument, Option, Parameter
+from rosz.cli.declare import Argument, CommandParameter, Option
 from rosz.cli.env import ALIASES
 from rosz.cli.manual import pages
 from rosz.cli.suggest import Line, Source
 from rosz.environment import Environment
 from rosz.errors import RoszError
-
-__all__ = ("HELPERS", "candidates", "complete", "expand", "split_line")
 
 HELPERS: dict[str, Source] = {
     "roscd": suggest.package_paths,
@@ -39,44 +37,33 @@ _BASH_BREAKS = ":="
 
 def complete(argv: Sequence[str]) -> int:
     """Print the candidates for the last word of a command line."""
-    shell, line = (*argv, "", "")[:2]
-    words = split_line(line)
+    shell, text = (*argv, "", "")[:2]
+    words = split_line(text)
     if words is None:
         return 0
     *before, word = words
     try:
-        environment = Environment.read()
-        with _time_limit(environment.completion):
-            found = candidates(environment, expand(before), word)
+        first, *rest = expand(before) or [""]
+        line = Line(Environment.read(), Path.cwd(), first, rest, word)
+        fitting = candidates(line)
     except (RoszError, OSError):  # an error message would disturb the person who types
         return 0
-    found = sorted({one for one in found if one.startswith(word)})
+    fitting = sorted({entry for entry in fitting if entry.startswith(word)})
     if shell == "bash" and (cut := max(word.rfind(mark) for mark in _BASH_BREAKS) + 1):
-        found = [candidate[cut:] for candidate in found]
+        fitting = [candidate[cut:] for candidate in fitting]
     if shell != "fish":  # fish quotes candidates by itself
-        found = [_quote(candidate) for candidate in found]
-    sys.stdout.write("".join(f"{candidate}\n" for candidate in found))
+        fitting = [_quote(candidate) for candidate in fitting]
+    sys.stdout.write("".join(f"{candidate}\n" for candidate in fitting))
     sys.stdout.flush()
+    if not line.is_idle():
+        os._exit(0)  # a thread may wait for the network for long
     return 0
-
-
-@contextmanager
-def _time_limit(seconds: float) -> Iterator[None]:
-    """End the process if a block takes longer than a time limit."""
-    timer = threading.Timer(seconds, lambda: os._exit(0))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 def split_line(line: str) -> list[str] | None:
     """Return the words of the last command of a line, the last word possibly empty.
 
-    Returns:
-        The words; ``None`` when a shell would not accept the line so far.
+    There are none (``None``) when a shell would not accept the line so far.
     """
     for close in ("", "'", '"'):
         lexer = shlex.shlex(line + close, posix=True, punctuation_chars="".join(_OPERATORS))
@@ -110,20 +97,18 @@ def expand(words: Sequence[str]) -> list[str]:
     return rest if command in HELPERS else []
 
 
-def candidates(environment: Environment, words: Sequence[str], word: str) -> list[str]:
+def candidates(line: Line) -> list[str]:
     """Return the words that may stand at the cursor, whatever its word begins with.
 
-    The words before the cursor are those that `expand` returns.
+    Args:
+        line: The line, whose group and words before the cursor are those that `expand` returns.
 
     Raises:
         RoszError: Something that is named before the cursor does not exist.
     """
-    from pathlib import Path
-
-    if not words:
+    first, rest, word = line.group, list(line.before), line.word
+    if not first:
         return []
-    first, *rest = words
-    line = Line(environment, Path.cwd(), first, rest, word)
     if first != "rosz":
         return HELPERS[first](line) if len(rest) < _HELPER_WORDS.get(first, 2) else []
     if rest == ["help"]:
@@ -151,34 +136,49 @@ def _in_command(line: Line, group: str, *words: str) -> list[str]:
     return source(line) if source else []
 
 
-def _source(parameters: Sequence[Parameter], words: Sequence[str], line: Line) -> Source | None:
-    """Return the source of what may follow the words of a command, and set the words before."""
-    options = {spelling: one for one in parameters for spelling in one.spellings}
-    before: list[str] = []
-    pending: Parameter | None = None
-    ended = False
-    for word in words:
-        if pending is not None:
-            pending = None
-        elif word == "--":
-            ended = True
-        elif word.startswith("-") and not ended:
-            one = options.get(word)
-            pending = None if one is None or one.kind is bool else one
-        else:
-            before.append(word)
-    line.before = before
+def _source(
+    parameters: Sequence[CommandParameter], words: Sequence[str], line: Line
+) -> Source | None:
+    """Return the source of the word at the cursor, and set the words before it."""
+    pending, ended = _read_before(parameters, words, line)
     if pending is not None:
-        return pending.mark and pending.mark.source
+        return pending.mark.source
     if line.word.startswith("-") and not ended:
-        shown = [one for one in parameters if isinstance(one.mark, Option) and one.mark.help]
-        names = [max(one.spellings, key=len) for one in shown]
-        return lambda _: [*names, "--help"]
-    arguments = [one for one in parameters if isinstance(one.mark, Argument)]
-    for place, one in enumerate(arguments):
-        if place == len(before) or one.many:
-            return one.mark and one.mark.source
+        shown = [
+            max(parameter.spellings, key=len)
+            for parameter in parameters
+            if isinstance(parameter.mark, Option) and parameter.mark.help
+        ]
+        return lambda _: [*shown, "--help"]
+    arguments = [parameter for parameter in parameters if isinstance(parameter.mark, Argument)]
+    for place, argument in enumerate(arguments):
+        if place == len(line.before) or argument.many:
+            return argument.mark.source
     return None
+
+
+def _read_before(
+    parameters: Sequence[CommandParameter], words: Sequence[str], line: Line
+) -> tuple[CommandParameter | None, bool]:
+    """Set the positional words before the cursor.
+
+    Return the option whose value stands at the cursor, and whether options have ended.
+    """
+    options = {spelling: parameter for parameter in parameters for spelling in parameter.spellings}
+    left = iter(words)
+    before: list[str] = []
+    line.before = before
+    for word in left:
+        if word == "--":
+            before += left
+            return None, True
+        option = options.get(word) if word.startswith("-") else None
+        if option is not None and option.kind is not bool:
+            if next(left, None) is None:
+                return option, False
+        elif not word.startswith("-"):
+            before.append(word)
+    return None, False
 
 
 def _quote(word: str) -> str:

@@ -6,24 +6,8 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TextIO
-
-if TYPE_CHECKING:
-    from types import FrameType
-
-__all__ = (
-    "count",
-    "paint",
-    "print_error",
-    "print_json",
-    "print_json_line",
-    "print_lines",
-    "print_result",
-    "takes_escapes",
-    "until_stopped",
-    "warn",
-    "write_file",
-)
+from types import FrameType
+from typing import Any, TextIO
 
 _LOOK_PERIOD = 0.2
 """Seconds between two looks for signals."""
@@ -100,6 +84,25 @@ def write_file(file: str, content: bytes) -> None:
         raise
 
 
+def at_first_signal(action: Callable[[], None]) -> Callable[[int, FrameType | None], None]:
+    """Return a handler of signals: the first calls a function, a later one ends the process."""
+    import signal
+    import time
+
+    first: list[float] = []
+
+    def handle(number: int, _frame: FrameType | None) -> None:
+        if not first:
+            first.append(time.monotonic())
+            action()
+        # timeout(1) sends its signal twice; a terminal sends Ctrl-C to all, who may pass it on.
+        elif time.monotonic() - first[0] > _SAME_REQUEST_SECONDS:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+
+    return handle
+
+
 @contextmanager
 def until_stopped() -> Iterator[Callable[[], None]]:
     """Make Ctrl-C and SIGTERM the regular end of a block that runs for ever.
@@ -110,24 +113,18 @@ def until_stopped() -> Iterator[Callable[[], None]]:
     lock. A later signal ends the process at once, in case the end takes too long.
     """
     import signal  # imported here, because most commands do not need it
-    import time
 
     handled: list[signal.Signals] = []
-    first: list[float] = []
 
-    def stop(number: int, _frame: FrameType | None) -> None:
-        if not first:
-            first.append(time.monotonic())
-            raise KeyboardInterrupt
-        # timeout(1) sends its signal twice; a terminal sends Ctrl-C to all, who may pass it on.
-        if time.monotonic() - first[0] > _SAME_REQUEST_SECONDS:
-            signal.signal(number, signal.SIG_DFL)
-            signal.raise_signal(number)
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    stop = at_first_signal(interrupt)
 
     def ready() -> None:
         # Python does not see a signal that comes right before it begins to wait, until the wait
         # ends or another signal interrupts it.
-        signal.signal(signal.SIGALRM, _ignore)
+        signal.signal(signal.SIGALRM, lambda *_: None)
         signal.setitimer(signal.ITIMER_REAL, _LOOK_PERIOD, _LOOK_PERIOD)
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is signal.SIG_DFL:
@@ -142,6 +139,3 @@ def until_stopped() -> Iterator[Callable[[], None]]:
         signal.setitimer(signal.ITIMER_REAL, 0)
         for number in handled:
             signal.signal(number, signal.SIG_DFL)
-
-
-def _ignore(_number: int, _frame: FrameType | None) -> None: ...

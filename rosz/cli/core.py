@@ -13,20 +13,21 @@ from contextlib import ExitStack, closing, contextmanager, nullcontext, redirect
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from rosz.cli import suggest
 from rosz.cli.console import count, print_error, print_lines, until_stopped
 from rosz.cli.declare import App, Option, at_least
 from rosz.errors import UsageError
 
 if TYPE_CHECKING:
+    from rosz.bridges.fleet import FleetPlan
+    from rosz.cli.core_fleet import Places
     from rosz.environment import Environment
     from rosz.params.replica import Replica
-    from rosz.params.replica.storage import Storage
-    from rosz.security import KeyFolder
-    from rosz.security.watch import KeyWatch
-    from rosz.session.router import Router
-
-__all__ = ("LogSummary", "app")
+    from rosz.security import KeyFolder, KeyWatch
+    from rosz.session import Router
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _LINE = re.compile(r"\S+ +(?:WARN|ERROR) .*?zenoh_link_tls\S*: (?P<reason>.*)")
@@ -38,6 +39,7 @@ _PROBE = "tls handshake eof"
 _NUMBER = re.compile(r"\d+")
 _EVERY_SECONDS = 60.0
 _KINDS = 100
+"""Kinds of messages that are remembered: peers that come and go must not fill the memory."""
 _STANDARD_OUTPUT = 1
 _LAST_PORT = 65535
 _MOST_PROCESSES = 1 << 22
@@ -46,88 +48,107 @@ _MOST_PROCESSES = 1 << 22
 app = App()
 
 
-@app.command()
-def core_command(
-    *,
+class CoreOptions(Struct, frozen=True, kw_only=True):
+    """The options of ``rosz core``."""
+
     listen: Annotated[
         list[str] | None,
         Option("--listen ENDPOINT", "Also listen here, such as at tcp/0.0.0.0:7447; repeatable."),
-    ] = None,
+    ] = None
     connect: Annotated[
         list[str] | None,
         Option("--connect ENDPOINT", "Connect here, such as to tcp/robot1:7447; repeatable."),
-    ] = None,
-    keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
-    store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = "",
+    ] = None
+    keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = ""
+    store: Annotated[str, Option("--store FILE", "Keep parameters in a file.", suggest.files)] = ""
     as_: Annotated[
         str | None, Option("--as NAMESPACE", "Put this machine's names below this one for others.")
-    ] = None,
+    ] = None
     share: Annotated[
         str | None,
         Option("--share PATTERNS", "What leaves with --as, such as /odom,/camera/**@2Hz."),
-    ] = None,
+    ] = None
     frames: Annotated[
         bool, Option("--frames", "With --as, also put the namespace before the frames of tf.")
-    ] = False,
+    ] = False
     fleet: Annotated[
         str | None,
         Option("--fleet FILE", "Read --as, --share and more from a file.", suggest.files),
-    ] = None,
+    ] = None
     ros1: Annotated[
         bool, Option("--ros1", "Also be the master of programs that speak ROS 1's protocol.")
-    ] = False,
-    port: Annotated[str, Option("-p --port PORT", "Port of --ros1, instead of 11311.")] = "",
+    ] = False
+    port: Annotated[str, Option("-p --port PORT", "Port of --ros1, instead of 11311.")] = ""
     address: Annotated[
         str,
         Option(
             "--address ADDRESS",
             "Address of --ros1, instead of 127.0.0.1; 0.0.0.0 for programs on other machines.",
         ),
-    ] = "",
+    ] = ""
     print_config: Annotated[
         bool, Option("--print-config", "Print the configuration for zenohd instead.")
-    ] = False,
-    owner: Annotated[int, Option("--owner PID")] = 0,
-) -> None:
+    ] = False
+    owner: Annotated[int, Option("--owner PID")] = 0
+
+
+@app.command()
+def core_command(options: CoreOptions) -> None:
     """Run a meeting point with a copy of the parameters, until it is stopped.
 
     No node needs a core. It links machines, and keeps parameters when no node runs.
     """
-    master_at = read_master_place(port, address, wanted=ros1)
-    at_least("--owner", owner, 0, "as the number of a process", _MOST_PROCESSES)
-    import msgspec
-
-    from rosz.cli.core_fleet import on_machine, open_fleet, read_fleet
-    from rosz.cli.core_restart import CoreWatch, Handover
+    master_at = read_master_place(options.port, options.address, wanted=options.ros1)
+    at_least("--owner", options.owner, 0, "as the number of a process", _MOST_PROCESSES)
+    from rosz.cli.core_fleet import on_machine, read_fleet
     from rosz.environment import Environment
-    from rosz.params.replica import Replica
-    from rosz.session.router import Router, zenoh_configuration
+    from rosz.session import zenoh_configuration
     from rosz.wire import Endpoint
 
     environment = Environment.read()
-    if keys:
-        environment = msgspec.structs.replace(environment, keys=Path(keys).absolute())
-    listen_at = [str(Endpoint.parse(text, "--listen")) for text in listen or ()]
-    connect_to = [str(Endpoint.parse(text, "--connect")) for text in connect or ()]
-    plan = read_fleet(environment, as_, share, fleet, frames=frames)
-    places = listen_at, connect_to
-    own = on_machine(plan, environment, places)
-    if print_config:
-        print_lines([zenoh_configuration(*own)])
+    if options.keys:
+        environment = replace(environment, keys=Path(options.keys).absolute())
+    places = (
+        [str(Endpoint.parse(text, "--listen")) for text in options.listen or ()],
+        [str(Endpoint.parse(text, "--connect")) for text in options.connect or ()],
+    )
+    fleet = read_fleet(
+        environment, options.as_, options.share, options.fleet, frames=options.frames
+    )
+    if options.print_config:
+        print_lines([zenoh_configuration(*on_machine(fleet, environment, places))])
         return
-    file = Path(store).absolute() if store else None
+    _run(options, environment, fleet, places, master_at)
+
+
+def _run(
+    options: CoreOptions,
+    environment: Environment,
+    fleet: FleetPlan | None,
+    places: Places,
+    master_at: tuple[str, int] | None,
+) -> None:
+    from rosz.cli.core_fleet import on_machine, open_fleet
+    from rosz.cli.core_restart import CoreWatch, Handover
+    from rosz.params.replica import Replica, Storage, StoreFile
+    from rosz.session import Router
+
+    own = on_machine(fleet, environment, places)
+    file = Path(options.store).absolute() if options.store else None
     logging = nullcontext() if environment.keys is None else _summarize_zenoh_log()
     with logging, until_stopped() as ready, ExitStack() as stack:
         before = Handover.take()
         key_watch = None if environment.keys is None else _watch_keys(environment)
-        storage = None if file is None else _open_storage(file, stack)
+        storage = None
+        if file is not None:
+            storage = stack.enter_context(closing(Storage(StoreFile(file))))
         router = stack.enter_context(Router(*own))
         domain = environment.domain
         replica = Replica(router.session, domain, storage=storage, handover=before.parameters)
         stack.enter_context(closing(replica))
         _set_core_params(replica)
-        crossing = open_fleet(plan, environment, router, replica, places, stack)
-        master = master_at and open_master(environment, *master_at, stack)
+        crossing = open_fleet(fleet, environment, router, replica, places, stack)
+        master = open_master(environment, *master_at, stack) if master_at else []
         watch = CoreWatch(router, replica, domain, before, key_watch=key_watch)
         stack.enter_context(closing(watch))
         ready()
@@ -137,8 +158,8 @@ def core_command(
         else:
             kept = f"parameters of domain {domain} are kept in {file or 'memory'}"
             lines = [*_describe(router, environment.rendezvous), *crossing]
-            print_lines([*lines, kept, *(master or ()), "started core; press Ctrl-C to end it"])
-        watch.restart_when_needed(owner)
+            print_lines([*lines, kept, *master, "started core; press Ctrl-C to end it"])
+        watch.restart_when_needed(options.owner)
 
 
 def read_master_place(port: str, address: str, *, wanted: bool) -> tuple[str, int] | None:
@@ -173,7 +194,6 @@ def open_master(environment: Environment, address: str, port: int, stack: ExitSt
 
 
 def _describe(router: Router, rendezvous: str) -> list[str]:
-    """Return what a router listens at, and what it is linked to."""
     lines = [f"listening on {endpoint}" for endpoint in router.endpoints]
     if router.holder:
         lines.append(f"{rendezvous} is held by {router.holder}: the core takes its place when free")
@@ -185,7 +205,7 @@ def _describe(router: Router, rendezvous: str) -> list[str]:
 
 
 def _watch_keys(environment: Environment) -> KeyWatch:
-    from rosz.security.watch import KeyWatch
+    from rosz.security import KeyWatch
     from rosz.session import keys_of
 
     def find() -> KeyFolder:
@@ -196,23 +216,17 @@ def _watch_keys(environment: Environment) -> KeyWatch:
     return KeyWatch(find)
 
 
-def _open_storage(file: Path, stack: ExitStack) -> Storage:
-    from rosz.params.replica.storage import Storage, StoreFile
-
-    return stack.enter_context(closing(Storage(StoreFile(file))))
-
-
 def _set_core_params(replica: Replica) -> None:
     """Set the parameters that a ROS 1 core sets, unless they are set already."""
-    from rosz.launch.run.network import core_params, write_params
+    from rosz.launch.run import core_params, write_params
 
-    known = core_params(str(uuid.uuid1()))
-    missing = {name: value for name, value in known.items() if not replica.has(name)}
+    params = core_params(str(uuid.uuid1()))
+    missing = {name: value for name, value in params.items() if not replica.has(name)}
     if missing:
         write_params(replica, missing)
 
 
-class LogSummary:
+class LogSummary(Struct, eq=False):
     """A summary of what Zenoh logs by itself: each kind of message once per minute.
 
     Zenoh writes to standard output, one line for each attempt to connect that it refuses; and a
@@ -221,12 +235,9 @@ class LogSummary:
     It calls a function with each line; the clock is in seconds.
     """
 
-    def __init__(
-        self, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._write = write
-        self._clock = clock
-        self._seen: dict[str, tuple[float, int]] = {}
+    write: Callable[[str], object]
+    clock: Callable[[], float] = time.monotonic
+    seen: dict[str, tuple[float, int]] = {}
 
     def add(self, line: str) -> None:
         """Write a line, unless one of its kind has been written within a minute."""
@@ -238,16 +249,16 @@ class LogSummary:
         if reason == _PROBE:
             return
         kind = _NUMBER.sub("0", reason)
-        since, more = self._seen.pop(kind, (-_EVERY_SECONDS, 0))
-        now = self._clock()
+        since, more = self.seen.pop(kind, (-_EVERY_SECONDS, 0))
+        now = self.clock()
         if now - since < _EVERY_SECONDS:
-            self._seen[kind] = (since, more + 1)
+            self.seen[kind] = (since, more + 1)
             return
-        while len(self._seen) >= _KINDS:
-            del self._seen[next(iter(self._seen))]
-        self._seen[kind] = (now, 0)
+        while len(self.seen) >= _KINDS:
+            del self.seen[next(iter(self.seen))]
+        self.seen[kind] = (now, 0)
         again = f" ({more} times more since)" if more else ""
-        self._write(f"WARNING: a link is refused: {reason}{again}" if match else reason)
+        self.write(f"WARNING: a link is refused: {reason}{again}" if match else reason)
 
 
 @contextmanager

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from rosz.bridges.fleet import FleetPlan
     from rosz.environment import Environment
     from rosz.params.replica import Replica
-    from rosz.session.router import Router
-
-__all__ = ("Places", "on_machine", "open_fleet", "read_fleet")
+    from rosz.session import Router
 
 Places = tuple[list[str], list[str]]
 """The endpoints to listen at, and those to connect to."""
@@ -32,28 +30,28 @@ def read_fleet(
     *,
     frames: bool,
 ) -> FleetPlan | None:
-    """Return what crosses; ``None`` if this machine keeps its names.
+    """Return the plan of the names that cross; ``None`` if this machine keeps its names.
 
-    The options replace what the file says. Without a file, there may be one beside the keys.
+    The options replace those of the file. Without a file, there may be one beside the keys.
     An option that is empty, as from a variable that is not set, is an error.
 
     Raises:
         UsageError: An option has no meaning, or a file cannot be read.
         YamlError: The file says something else.
     """
-    found = _beside_keys(environment) if file is None else Path(file)
-    if namespace is None and share is None and found is None and not frames:
+    path = _beside_keys(environment) if file is None else Path(file)
+    if namespace is None and share is None and path is None and not frames:
         return None
     from rosz.bridges.fleet import FleetPlan, check_prefix, read_plan, read_share
     from rosz.security import read_trusted
 
-    plan = FleetPlan() if found is None else read_plan(read_trusted(found), str(found))
+    plan = FleetPlan() if path is None else read_plan(read_trusted(path), str(path))
     if namespace is not None:
         plan = msgspec.structs.replace(plan, prefix=check_prefix(namespace, "--as"))
     if share is not None:
         plan = msgspec.structs.replace(plan, share=read_share(share))
     if not plan.prefix:
-        line = f", or a line 'as: /robot1' in '{found}'" if found else ""
+        line = f", or a line 'as: /robot1' in '{path}'" if path else ""
         raise UsageError(f"no namespace for this machine: expected --as /robot1{line}")
     return msgspec.structs.replace(plan, frames=plan.frames or frames)
 
@@ -84,7 +82,7 @@ def open_fleet(
     places: Places,
     stack: ExitStack,
 ) -> list[str]:
-    """Start what crosses, and return lines that describe it.
+    """Start the exchange with others, and return lines that describe it.
 
     Raises:
         TransportError: Another robot has the namespace, or an endpoint is occupied or malformed.

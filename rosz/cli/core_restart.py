@@ -10,21 +10,23 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from rosz.params.wire import Keys
-from rosz.session.restart import restart_program, take_handover
-from rosz.session.split import SplitWatch
-from rosz.session.standstill import Standstill
+from rosz.session import (
+    Router,
+    SplitWatch,
+    SuspensionDetector,
+    on_loss,
+    restart_program,
+    take_handover,
+)
 from rosz.wire import processes_key, tokens_key
 
 if TYPE_CHECKING:
     from rosz.params.replica import Replica
-    from rosz.security.watch import KeyWatch
-    from rosz.session.router import Router
-
-__all__ = ("CoreWatch", "Handover")
+    from rosz.security import KeyWatch
 
 _LOOK_SECONDS = 1.0
 _CALM_SECONDS = 600.0
-"""Time without a split after which the next one is the first one."""
+"""Time without a split after which patience, which doubles with each split, begins anew."""
 
 
 class Handover(msgspec.Struct):
@@ -48,15 +50,7 @@ class Handover(msgspec.Struct):
 
 
 class CoreWatch:
-    """Finds out when a core has to start afresh.
-
-    Args:
-        router: Router of the core.
-        replica: Replica of the core.
-        domain: ROS domain of the replica.
-        before: What was handed over to this process.
-        key_watch: Watch of the keys that the router uses; None without keys.
-    """
+    """Finds out when a core has to start afresh."""
 
     def __init__(
         self,
@@ -71,10 +65,11 @@ class CoreWatch:
         self._router = router
         self._key_watch = key_watch
         self._splits = before.splits
-        self._standstill = Standstill(router.outlasted_silence)
+        self._suspension = SuspensionDetector(router.outlasted_silence)
         self._began = time.monotonic()
         self._found = threading.Event()
         self._why = ""
+        on_loss(self._restart)
         self._split_watch: SplitWatch | None = None
         if not router.has_rules:
             keys = Keys(domain, scoped=router.session.secured)
@@ -96,7 +91,7 @@ class CoreWatch:
             if owner and os.getppid() != owner:
                 return
             self._router.check_room()
-            if seconds := self._standstill.seconds():
+            if seconds := self._suspension.seconds():
                 self._why = f"stood still for {seconds:.0f} s, longer than others keep its links"
                 break
             if self._key_watch is not None and (change := self._key_watch.change()):
@@ -114,5 +109,8 @@ class CoreWatch:
     def _on_split(self, why: str) -> None:
         calm = time.monotonic() - self._began > _CALM_SECONDS
         self._splits = 1 if calm else self._splits + 1
+        self._restart(why)
+
+    def _restart(self, why: str) -> None:
         self._why = why
         self._found.set()

@@ -1,14 +1,18 @@
 """Declarations of commands: their arguments, options and help texts.
 
 A command is a function. The annotations of its parameters say which are positional arguments and
-which are options, as in typer. Typer takes longer to import than most commands take to run, so the
-declarations do not need it: `rosz.cli.reading` reads a sound command line from them, and
-`rosz.cli.typer_app` translates them for typer, which writes help and explains what is wrong.
+which are options, as in typer. A parameter whose type is a `msgspec.Struct` stands for the fields
+of the struct, which are declared in the same way: so a command has one parameter for many options.
+
+Typer takes longer to import than most commands take to run, so the declarations do not need it:
+`rosz.cli.reading` reads a sound command line from them, and `rosz.cli.typer_app` translates them
+for typer, which writes help and explains faults of a line.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from itertools import islice
 from types import NoneType, UnionType
 from typing import (
@@ -28,20 +32,6 @@ from rosz.errors import UsageError
 if TYPE_CHECKING:
     from rosz.cli.suggest import Source
 
-__all__ = (
-    "App",
-    "Argument",
-    "Command",
-    "Json",
-    "Option",
-    "Parameter",
-    "at_least",
-    "no_less_than_zero",
-    "per_second",
-    "seconds",
-    "values_last",
-)
-
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _MOST = 1_000_000_000
 _LONGEST = 1e9
@@ -54,7 +44,6 @@ class Argument(NamedTuple):
 
     Args:
         metavar: The name in help.
-        help: The description in help.
         source: The source of completions.
     """
 
@@ -90,22 +79,18 @@ class Option(NamedTuple):
 Json = Annotated[bool, Option("--json", "Print JSON.")]
 
 
-class Parameter(NamedTuple):
-    """One parameter of a command's function.
+class CommandParameter(NamedTuple):
+    """One argument or option of a command.
 
     Args:
-        name: Name of the parameter.
-        kind: Type of one value: `str`, `int`, `float` or `bool`. A parameter without a mark has
-            another type, which is called with the remappings of the command line.
-        mark: The declaration; ``None`` for a parameter that is not on the command line.
+        kind: Type of one value: `str`, `int`, `float` or `bool`.
         many: Whether it takes several values.
-        required: Whether it must be given.
-        default: The value when it is not given.
     """
 
     name: str
+    hint: Any
     kind: Callable[[Any], Any]
-    mark: Argument | Option | None
+    mark: Argument | Option
     many: bool
     required: bool
     default: Any
@@ -120,8 +105,6 @@ class Command(NamedTuple):
     """One command.
 
     Args:
-        function: The function that runs it.
-        help: The description.
         arrange: A function that puts the words into the order in which they are read.
         interspersed: Whether options may follow positional arguments.
         tolerant: Whether unknown options count as positional arguments.
@@ -133,28 +116,65 @@ class Command(NamedTuple):
     interspersed: bool
     tolerant: bool
 
-    def parameters(self) -> list[Parameter]:
-        """Return the parameters of the function, in order."""
-        # inspect.signature would do the same, but inspect takes long to import.
+    def parameters(self) -> list[CommandParameter]:
+        """Return the arguments and options, in order."""
         function: Any = self.function
+        # inspect.signature would do the same, but inspect takes long to import.
         code = function.__code__
         names = code.co_varnames[: code.co_argcount]
         given = function.__defaults__ or ()
         defaults: dict[str, Any] = dict(zip(names[len(names) - len(given) :], given, strict=True))
         defaults |= function.__kwdefaults__ or {}
-        found = []
-        for name, hint in get_type_hints(function, include_extras=True).items():
-            if name == "return":
-                continue
-            mark = next(iter(getattr(hint, "__metadata__", ())), None)
-            kind = hint if mark is None else hint.__origin__
-            if get_origin(kind) in {Union, UnionType}:
-                (kind,) = (one for one in get_args(kind) if one is not NoneType)
-            many = get_origin(kind) is list
-            kind = get_args(kind)[0] if many else kind
-            required = name not in defaults
-            found.append(Parameter(name, kind, mark, many, required, defaults.get(name)))
-        return found
+        parameters = []
+        for name, hint in _hints(function).items():
+            if hasattr(hint, "__metadata__"):
+                default = defaults.get(name)
+                parameters.append(_parameter(name, hint, default, required=name not in defaults))
+            elif hasattr(hint, "__struct_fields__"):
+                from msgspec.structs import fields
+
+                for field in fields(hint):
+                    default = None if field.required else field.default
+                    parameters.append(
+                        _parameter(field.name, field.type, default, required=field.required)
+                    )
+        return parameters
+
+    def run(self, values: Mapping[str, Any], remappings: Sequence[str]) -> Any:
+        """Call the function.
+
+        Args:
+            values: The values of those parameters and fields that are given, by name.
+            remappings: The remappings of the command line. A parameter without a mark has a type
+                that is called with them.
+        """
+        arguments: dict[str, Any] = {}
+        for name, hint in _hints(self.function).items():
+            if hasattr(hint, "__struct_fields__"):
+                given = values.keys() & hint.__struct_fields__
+                arguments[name] = hint(**{field: values[field] for field in given})
+            elif not hasattr(hint, "__metadata__"):
+                arguments[name] = hint(remappings)
+            elif name in values:
+                arguments[name] = values[name]
+        return self.function(**arguments)
+
+
+@cache
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    hints = get_type_hints(function, include_extras=True)
+    hints.pop("return", None)
+    return hints
+
+
+def _parameter(name: str, annotated: Any, default: Any, *, required: bool) -> CommandParameter:
+    hint, mark = annotated.__origin__, annotated.__metadata__[0]
+    kind = hint
+    if get_origin(kind) in {Union, UnionType}:
+        (kind,) = (member for member in get_args(kind) if member is not NoneType)
+    many = get_origin(kind) is list
+    kind = get_args(kind)[0] if many else kind
+    return CommandParameter(name, hint, kind, mark, many, required, default)
 
 
 class App:

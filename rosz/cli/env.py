@@ -3,7 +3,7 @@
 A folder of small programs goes on the PATH, so that ``timeout 5 rostopic …``, ``nohup roscore`` and
 scripts find them as well. Only roscd, which changes the working folder of the shell, is a function.
 A second folder goes to the end of the PATH. It has a program for each command that rosz has not,
-which says what to use instead, where the machine does not have that command. A third one goes on
+which names the replacement, where the machine does not have that command. A third one goes on
 the PYTHONPATH, so that scripts that are run directly can import rospy. In an interactive shell, the
 TAB key runs ``rosz complete``.
 """
@@ -20,8 +20,6 @@ from rosz.cli.commands import OLD_NAMES
 from rosz.cli.console import print_json, print_result, warn
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import UsageError, near_miss
-
-__all__ = ("ALIASES", "SHELLS", "app")
 
 SHELLS = ("bash", "zsh", "fish")
 
@@ -137,9 +135,9 @@ def env_command(
 
 
 def _write_editor(*, as_json: bool) -> None:
-    """Write stubs to the user's cache, and print what tells editors of them."""
+    """Write stubs to the user's cache, and print the settings for editors."""
     from rosz.environment import Environment
-    from rosz.workspace.editor import write_stubs
+    from rosz.workspace import write_stubs
 
     made = write_stubs(Environment.read())
     for package, fault in made.faults.items():

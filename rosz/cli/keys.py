@@ -11,8 +11,6 @@ from rosz.cli.console import count, print_json
 from rosz.cli.declare import App, Argument, Json, Option, at_least
 from rosz.errors import UsageError
 
-__all__ = ("app",)
-
 app = App("Make and check the keys that links between machines need (ROSZ_KEYS).")
 
 _Folder = Annotated[
@@ -28,7 +26,7 @@ def init_keys(
     days: Annotated[int, Option("--days DAYS", "Time until the authority expires.")] = 3650,
 ) -> None:
     """Make a folder for keys, with an authority that signs them."""
-    from rosz.security.authority import Authority
+    from rosz.security import Authority
 
     at_least("--days", days, 1, "days")
     authority = Authority.create(Path(folder).absolute(), name, days)
@@ -51,7 +49,7 @@ def add_keys(
     folder: _Folder = "",
 ) -> None:
     """Make keys for machines or people."""
-    from rosz.security.authority import Authority
+    from rosz.security import Authority
 
     at_least("--days", days, 1, "days")
     if address and len(names) > 1:
@@ -64,15 +62,13 @@ def add_keys(
 
 @app.command("revoke")
 def revoke_keys(
-    names: Annotated[list[str], Argument("HOST|USER")],
-    *,
-    folder: _Folder = "",
+    names: Annotated[list[str], Argument("HOST|USER")], *, folder: _Folder = ""
 ) -> None:
     """Revoke the keys of machines or people, such as of a robot that was stolen.
 
     Every machine has to get the new certificate of the authority. Running cores notice it.
     """
-    from rosz.security.authority import Authority
+    from rosz.security import Authority
 
     authority = Authority(_folder(folder, f"revoke {' '.join(names)} --dir"))
     for name in names:
@@ -85,21 +81,17 @@ def revoke_keys(
 
 
 @app.command("list")
-def list_keys(
-    *,
-    json: Json = False,
-    folder: _Folder = "",
-) -> None:
+def list_keys(*, json: Json = False, folder: _Folder = "") -> None:
     """List the holders of keys, with their addresses and the dates on which the keys expire."""
-    from rosz.security.review import review
+    from rosz.security import review_keys
 
-    found = review(_folder(folder, "list --dir"))
+    review = review_keys(_folder(folder, "list --dir"))
     if json:
-        print_json(found)
+        print_json(review)
         return
-    for one in found.holders:
-        places = f" ({', '.join(one.places)})" if one.places else ""
-        sys.stdout.write(f"{one.name}{places}: until {one.until:%Y-%m-%d}\n")
+    for holder in review.holders:
+        places = f" ({', '.join(holder.places)})" if holder.places else ""
+        sys.stdout.write(f"{holder.name}{places}: until {holder.until:%Y-%m-%d}\n")
 
 
 @app.command("check")
@@ -109,22 +101,22 @@ def check_keys(
     json: Json = False,
 ) -> int:
     """Check certificates, access to key files, and rules; exit code 1 if something is wrong."""
-    from rosz.security.review import review
+    from rosz.security import review_keys
 
-    found = review(_folder(folder, "check"))
+    review = review_keys(_folder(folder, "check"))
     if json:
-        print_json(found)
+        print_json(review)
     else:
-        for one in found.holders:
-            sys.stdout.write(f"{one.name}: until {one.until:%Y-%m-%d}\n")
-        for place in found.rules:
+        for holder in review.holders:
+            sys.stdout.write(f"{holder.name}: until {holder.until:%Y-%m-%d}\n")
+        for place in review.rules:
             sys.stdout.write(f"{place.file}\n")
             for who, allowed in place.allowed.items():
                 sys.stdout.writelines(f"  {who}: {line}\n" for line in allowed)
-        sys.stdout.writelines(f"WRONG: {line}\n" for line in found.wrong)
-        holders = count(len(found.holders), "holder")
-        sys.stdout.write(f"{holders} of keys, {len(found.wrong)} wrong\n")
-    return int(bool(found.wrong))
+        sys.stdout.writelines(f"WRONG: {line}\n" for line in review.wrong)
+        holders = count(len(review.holders), "holder")
+        sys.stdout.write(f"{holders} of keys, {len(review.wrong)} wrong\n")
+    return int(bool(review.wrong))
 
 
 def _folder(given: str, command: str) -> Path:

@@ -11,15 +11,18 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+from urllib.parse import urlsplit
 
 import msgspec
+from msgspec import Struct
 
 from rosz.cli import suggest
 from rosz.cli.console import print_error, print_json, print_lines
 from rosz.cli.declare import App, Argument, Option, seconds
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, NotFoundError, TransportError, UsageError
-from rosz.packages import manifest_of
+from rosz.names import anonymous
+from rosz.packages import PackageIndex, manifest_of
 
 if TYPE_CHECKING:
     from rosz.launch.plan import LaunchText, Plan
@@ -27,25 +30,91 @@ if TYPE_CHECKING:
         LaunchStatus,
         NodeStatus,
         Options,
-        RouterProcess,
         StatusClient,
         Workplace,
     )
     from rosz.node import Context
-    from rosz.packages import PackageIndex
-
-__all__ = ("app",)
 
 app = App()
 
+_QUESTIONS = ("nodes", "args", "find_node", "files", "ros_args", "dump_params", "dump_plan")
+_REQUESTS = ("status", "restart", "stop", "output")
 _LISTED = 8
 _WAIT_PERIOD = 0.1
 _SAMPLE_SECONDS = 0.4
 """Time between the two measurements of processor time that give a share."""
 
 
+class LaunchOptions(Struct, frozen=True, kw_only=True):
+    """The options of ``rosz launch``."""
+
+    screen: Annotated[bool, Option("--screen", "Show the output of all nodes.")] = False
+    log: Annotated[bool, Option("--log", "Write the output of all nodes to files.")] = False
+    required: Annotated[bool, Option("--required", "End the launch when any node ends.")] = False
+    wait: Annotated[bool, Option("--wait", "Wait until a core or another launch runs.")] = False
+    local: Annotated[bool, Option("--local", "Leave out nodes of other machines.")] = False
+    prefix: Annotated[bool, Option("--prefix", "Begin each line with its node's name.")] = False
+    verbose: Annotated[bool, Option("-v", "Print more.")] = False
+    no_summary: Annotated[bool, Option("--no-summary", "Do not print what will start.")] = False
+    disable_title: Annotated[
+        bool, Option("--disable-title", "Do not change the title of the terminal.")
+    ] = False
+    sigint_timeout: Annotated[
+        float,
+        Option("--sigint-timeout SECONDS", "Time from SIGINT to SIGTERM when nodes are stopped."),
+    ] = 15.0
+    sigterm_timeout: Annotated[
+        float, Option("--sigterm-timeout SECONDS", "Time from SIGTERM to SIGKILL.")
+    ] = 2.0
+    keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = ""
+    pid: Annotated[
+        str, Option("--pid FILE", "Write the process id of the launch to a file.", suggest.files)
+    ] = ""
+    nodes: Annotated[bool, Option("--nodes", "List the nodes.")] = False
+    args: Annotated[str | None, Option("--args NODE", "Print the command line of a node.")] = None
+    find_node: Annotated[
+        str | None, Option("--find-node NODE", "Print the file that declares a node.")
+    ] = None
+    files: Annotated[bool, Option("--files", "List the files.")] = False
+    ros_args: Annotated[bool, Option("--ros-args", "List the args that the file takes.")] = False
+    dump_params: Annotated[bool, Option("--dump-params", "Print all parameters as YAML.")] = False
+    dump_plan: Annotated[bool, Option("--dump-plan", "Print the whole plan as JSON.")] = False
+    status: Annotated[bool, Option("--status", "List the nodes of running launches.")] = False
+    restart: Annotated[
+        str | None, Option("--restart NODE", "Restart a node of a running launch.", suggest.nodes)
+    ] = None
+    stop: Annotated[
+        str | None, Option("--stop NODE", "Stop a node of a running launch.", suggest.nodes)
+    ] = None
+    output: Annotated[
+        str | None,
+        Option(
+            "--output NODE", "Print the newest output of a node of a running launch.", suggest.nodes
+        ),
+    ] = None
+    json: Annotated[bool, Option("--json", "Print JSON, with --status.")] = False
+    machine: Annotated[
+        list[str] | None,
+        Option(
+            "--machine [NAME=][USER@]ADDRESS[:PORT]",
+            "Address of a machine of the file; without NAME, of the machine for nodes that"
+            " name none.",
+        ),
+    ] = None
+    lost_after: Annotated[
+        float,
+        Option("--lost-after SECONDS", "Time without a sign of another machine until it is lost."),
+    ] = 30.0
+    agent: Annotated[bool, Option("--agent")] = False
+    skip_log_check: Annotated[bool, Option("--skip-log-check")] = True
+    """roslaunch's scripts pass it; rosz has no such check."""
+    port: Annotated[str, Option("--port -p")] = ""
+    core: Annotated[bool, Option("--core")] = False
+
+
 @app.command()
 def launch_command(
+    options: LaunchOptions,
     words: Annotated[
         list[str] | None,
         Argument(
@@ -55,140 +124,73 @@ def launch_command(
             suggest.launch_words,
         ),
     ] = None,
-    *,
-    screen: Annotated[bool, Option("--screen", "Show the output of all nodes.")] = False,
-    log: Annotated[bool, Option("--log", "Write the output of all nodes to files.")] = False,
-    required: Annotated[bool, Option("--required", "End the launch when any node ends.")] = False,
-    wait: Annotated[bool, Option("--wait", "Wait until a core or another launch runs.")] = False,
-    local: Annotated[bool, Option("--local", "Leave out nodes of other machines.")] = False,
-    prefix: Annotated[bool, Option("--prefix", "Begin each line with its node's name.")] = False,
-    verbose: Annotated[bool, Option("-v", "Print more.")] = False,
-    no_summary: Annotated[bool, Option("--no-summary", "Do not print what will start.")] = False,
-    disable_title: Annotated[
-        bool, Option("--disable-title", "Do not change the title of the terminal.")
-    ] = False,
-    sigint_timeout: Annotated[
-        float,
-        Option("--sigint-timeout SECONDS", "Time from SIGINT to SIGTERM when nodes are stopped."),
-    ] = 15.0,
-    sigterm_timeout: Annotated[
-        float, Option("--sigterm-timeout SECONDS", "Time from SIGTERM to SIGKILL.")
-    ] = 2.0,
-    keys: Annotated[str, Option("--keys DIR", "Folder of keys for links to other machines.")] = "",
-    pid: Annotated[
-        str, Option("--pid FILE", "Write the process id of the launch to a file.", suggest.files)
-    ] = "",
-    nodes: Annotated[bool, Option("--nodes", "List the nodes.")] = False,
-    args: Annotated[str | None, Option("--args NODE", "Print the command line of a node.")] = None,
-    find_node: Annotated[
-        str | None, Option("--find-node NODE", "Print the file that declares a node.")
-    ] = None,
-    files: Annotated[bool, Option("--files", "List the files.")] = False,
-    ros_args: Annotated[bool, Option("--ros-args", "List the args that the file takes.")] = False,
-    dump_params: Annotated[bool, Option("--dump-params", "Print all parameters as YAML.")] = False,
-    dump_plan: Annotated[bool, Option("--dump-plan", "Print the whole plan as JSON.")] = False,
-    status: Annotated[bool, Option("--status", "List the nodes of running launches.")] = False,
-    restart: Annotated[
-        str | None, Option("--restart NODE", "Restart a node of a running launch.", suggest.nodes)
-    ] = None,
-    stop: Annotated[
-        str | None, Option("--stop NODE", "Stop a node of a running launch.", suggest.nodes)
-    ] = None,
-    output: Annotated[
-        str | None,
-        Option(
-            "--output NODE", "Print the newest output of a node of a running launch.", suggest.nodes
-        ),
-    ] = None,
-    json: Annotated[bool, Option("--json", "Print JSON, with --status.")] = False,
-    machine: Annotated[
-        list[str] | None,
-        Option(
-            "--machine [NAME=][USER@]ADDRESS[:PORT]",
-            "Address of a machine of the file; without NAME, of the machine for nodes that"
-            " name none.",
-        ),
-    ] = None,
-    lost_after: Annotated[
-        float,
-        Option("--lost-after SECONDS", "Time without a sign of another machine until it is lost."),
-    ] = 30.0,
-    agent: Annotated[bool, Option("--agent")] = False,
-    skip_log_check: Annotated[bool, Option("--skip-log-check")] = True,
-    port: Annotated[str, Option("--port -p")] = "",
-    core: Annotated[bool, Option("--core")] = False,
 ) -> int:
     """Start the nodes of launch files, and run until they end.
 
     Without options it does what roslaunch does. Python nodes in a <group container="NAME"> share a
     process (rosz help containers).
     """
-    del skip_log_check  # roslaunch's scripts pass it; rosz has no such check
-    if core or port:
+    if options.core or options.port:
         raise UsageError(
             "there is no master, and so no port: 'rosz core' runs a meeting point, ROS_DOMAIN_ID"
             " keeps groups of nodes apart"
         )
-    if agent:
-        from rosz.launch.run.agent import serve
+    if options.agent:
+        from rosz.launch.run import serve
 
         with ExitStack() as stack:
             serve(partial(_find_master, stack))
         return 0
-    nodes_named = {"restart": restart, "stop": stop, "output": output}
-    _check_named(args=args, find_node=find_node, **nodes_named)
-    if status or any(nodes_named.values()):
-        _control(words or (), {"status": str(status or ""), **nodes_named}, as_json=json)
+    questions, requests = _given(options, _QUESTIONS), _given(options, _REQUESTS)
+    if requests:
+        if words or len(requests) > 1:
+            raise UsageError(
+                "--status, --restart, --stop and --output stand alone: one of them, and no file"
+            )
+        _request(*requests[0], as_json=options.json)
         return 0
-    asked = _asked(
-        nodes=nodes,
-        args=args,
-        find_node=find_node,
-        files=files,
-        ros_args=ros_args,
-        dump_params=dump_params,
-        dump_plan=dump_plan,
-    )
-    launch = _Launch(words or (), Path(keys).expanduser().absolute() if keys else None)
-    if asked:
-        print_lines([launch.answer(*asked)])
+    if len(questions) > 1:
+        listing = ", ".join(f"--{name}" for name, _ in questions)
+        raise UsageError(f"{listing}: only one of them can be answered at a time")
+    keys = Path(options.keys).expanduser().absolute() if options.keys else None
+    launch = _Launch(words or (), keys)
+    if questions:
+        print_lines([launch.answer(*questions[0])])
         return 0
+    settings = _settings(options)
+    if options.pid:
+        Path(options.pid).expanduser().write_text(str(os.getpid()))
+    return launch.run(settings, wait=options.wait)
+
+
+def _given(options: LaunchOptions, names: Sequence[str]) -> list[tuple[str, str]]:
+    """Return those of some options that are given, each with its node."""
+    values = {name.replace("_", "-"): getattr(options, name) for name in names}
+    for option, node in values.items():
+        if node == "":  # a script's empty variable must not start a launch
+            raise UsageError(f"--{option} is ''; expected the name of a node")
+    return [(option, str(node)) for option, node in values.items() if node]
+
+
+def _settings(options: LaunchOptions) -> Options:
     from rosz.launch.run import MachineOption, Options, Timeouts
 
-    interrupt = seconds("--sigint-timeout", sigint_timeout)
-    terminate = seconds("--sigterm-timeout", sigterm_timeout)
-    options = Options(
-        screen=screen,
-        log=log,
-        required=required,
-        local=local,
-        prefixed=prefix,
-        verbose=verbose,
-        overview=not no_summary,
-        title=not disable_title,
-        machines=tuple(map(MachineOption.parse, machine or ())),
-        silence=seconds("--lost-after", lost_after),
-        timeouts=Timeouts(interrupt, terminate),
+    return Options(
+        screen=options.screen,
+        log=options.log,
+        required=options.required,
+        local=options.local,
+        prefixed=options.prefix,
+        verbose=options.verbose,
+        overview=not options.no_summary,
+        title=not options.disable_title,
+        machines=tuple(map(MachineOption.parse, options.machine or ())),
+        silence=seconds("--lost-after", options.lost_after),
+        timeouts=Timeouts(
+            seconds("--sigint-timeout", options.sigint_timeout),
+            seconds("--sigterm-timeout", options.sigterm_timeout),
+        ),
     )
-    if pid:
-        Path(pid).expanduser().write_text(str(os.getpid()))
-    return launch.run(options, wait=wait)
-
-
-def _check_named(**nodes: str | None) -> None:
-    """Refuse an empty node name: a script's empty variable must not start a launch."""
-    for option, node in nodes.items():
-        if node == "":
-            raise UsageError(f"--{option.replace('_', '-')} is ''; expected the name of a node")
-
-
-def _asked(**questions: str | bool | None) -> tuple[str, str] | None:
-    """Return the one of roslaunch's questions that is asked, and its node."""
-    asked = [(name.replace("_", "-"), str(value)) for name, value in questions.items() if value]
-    if len(asked) > 1:
-        listing = ", ".join(f"--{name}" for name, _ in asked)
-        raise UsageError(f"{listing}: only one of them can be answered at a time")
-    return asked[0] if asked else None
 
 
 class _Launch:
@@ -224,24 +226,22 @@ class _Launch:
 
     @property
     def namespace(self) -> str:
-        """The namespace of all nodes."""
         return self.arguments.ns or self.environment.namespace
 
     def plan(self) -> Plan:
-        """Return the plan of the launch."""
         from rosz.launch.plan import plan
 
         return plan(self.files, self.arguments.args, self.context, ns=self.namespace)
 
     def workplace(self) -> Workplace:
-        """Return what is needed to make the commands of nodes."""
+        """Return the packages and settings from which the commands of nodes are made."""
         from rosz.launch.run import Workplace
 
         return Workplace(self.packages, self.environment, self.environ, str(self.cwd))
 
     def answer(self, question: str, node: str) -> str:
-        """Return the answer to one of roslaunch's questions."""
-        from rosz.launch.plan import describe_args, report
+        from rosz.launch.plan import describe_args
+        from rosz.launch.run import report
 
         if question == "ros-args":
             docs = describe_args(self.files, self.arguments.args, self.context, ns=self.namespace)
@@ -259,29 +259,28 @@ class _Launch:
         return listings.get(question, report.dump_params)(plan)
 
     def run(self, options: Options, *, wait: bool) -> int:
-        """Run the plan, and return the exit code."""
-        from rosz.launch.run import RouterProcess, interrupted_by_signals, needs_router
-
-        plan = self.plan()
-        if not needs_router(len(plan.nodes), self.environment, self.environ):
-            return self._run_plan(plan, options, wait=wait)
-        with interrupted_by_signals(), RouterProcess(self.environment, self.environ) as router:
-            self.environment, self.environ = router.environment, router.environ
-            return self._run_plan(plan, options, wait=wait, router=router)
-
-    def _run_plan(
-        self, plan: Plan, options: Options, *, wait: bool, router: RouterProcess | None = None
-    ) -> int:
-        from rosz.launch.run import Network, Runner
+        from rosz.launch.run import (
+            Network,
+            RouterProcess,
+            Runner,
+            interrupted_by_signals,
+            needs_router,
+        )
         from rosz.node import Context
 
-        with ExitStack() as stack, Context(self.environment) as context:
-            if wait:
-                _wait_for_peer(context)
-            self._open_master(plan, stack)
-            network = Network(context, router)
-            place = self.workplace()
-            return Runner(plan, place, network, options, out=sys.stdout, err=sys.stderr).run()
+        plan = self.plan()
+        with ExitStack() as stack:
+            router: RouterProcess | None = None
+            if needs_router(len(plan.nodes), self.environment, self.environ):
+                stack.enter_context(interrupted_by_signals())
+                router = stack.enter_context(RouterProcess(self.environment, self.environ))
+                self.environment, self.environ = router.environment, router.environ
+            with ExitStack() as masters, Context(self.environment) as context:
+                if wait:
+                    _wait_for_peer(context)
+                self._open_master(plan, masters)
+                network, place = Network(context, router), self.workplace()
+                return Runner(plan, place, network, options, out=sys.stdout, err=sys.stderr).run()
 
     def _open_master(self, plan: Plan, stack: ExitStack) -> None:
         """Be the master of programs that may speak ROS 1's protocol.
@@ -304,23 +303,34 @@ class _Launch:
 def _find_master(
     stack: ExitStack, environ: Mapping[str, str], environment: Environment
 ) -> tuple[str, dict[str, str]]:
-    """Return a master for ROS 1's programs: the one that is named and runs, or a new one.
+    """Return a master for ROS 1's programs, as its owner and their environment variables.
 
-    Args:
-        stack: What closes the new one.
-        environ: Environment variables, which may name one.
-        environment: The settings in them.
-
-    Returns:
-        Whose it is, and the environment variables of the programs.
+    It is the one that the variables name, if it runs, or a new one that the stack closes. The new
+    one is at the port that they name for this machine, if that is free: other terminals use it.
     """
-    from rosz.bridges.ros1 import open_master, running_master
+    from rosz.bridges.ros1 import MASTER_PORT, MasterBridge, open_master, running_master
 
     if running_master(environ):
         return "running", dict(environ)
-    bridge = stack.enter_context(open_master(environment))
+    port = _local_port(environ.get("ROS_MASTER_URI", "")) or MASTER_PORT
+    try:
+        bridge = MasterBridge(environment, port=port)
+    except TransportError:
+        bridge = open_master(environment)
+    stack.enter_context(bridge)
     uri = f"http://127.0.0.1:{bridge.port}"
     return "this launch's", {"ROS_IP": "127.0.0.1", **environ, "ROS_MASTER_URI": uri}
+
+
+def _local_port(uri: str) -> int | None:
+    """Return the port of a URI whose host is this machine; None for another or an invalid one."""
+    from rosz.launch.run import is_local_address
+
+    try:
+        parts = urlsplit(uri)
+        return parts.port if is_local_address(parts.hostname or "") else None
+    except ValueError:
+        return None
 
 
 def _anonymous_names() -> Callable[[str], str]:
@@ -330,10 +340,8 @@ def _anonymous_names() -> Callable[[str], str]:
     def make(base: str) -> str:
         import socket
 
-        from rosz import names
-
         moment = time.time_ns() // 1_000_000 + next(numbers)
-        return names.anonymous(base, socket.gethostname(), os.getpid(), moment)
+        return anonymous(base, socket.gethostname(), os.getpid(), moment)
 
     return make
 
@@ -348,9 +356,7 @@ def _wait_for_peer(context: Context) -> None:
 def _find_files(words: Sequence[str], packages: PackageIndex) -> list[str | LaunchText]:
     """Return the launch files that a command line names.
 
-    Args:
-        words: A package and one of its files, then paths; or paths alone. One of them may be ``-``.
-        packages: The packages on the package path.
+    The words are a package and one of its files, then paths; or paths alone.
 
     Raises:
         UsageError: No file is named, or standard input is named twice.
@@ -387,7 +393,7 @@ def _first_file(words: Sequence[str], packages: PackageIndex) -> tuple[str, Sequ
 
 
 def _hint(name: str, packages: PackageIndex) -> str:
-    """Return where a file of that name is, or what else the word may mean."""
+    """Return the place of a file of that name, or another meaning of the word."""
     if "/" in name:
         return ""
     if Path("launch", name).is_file():
@@ -408,23 +414,12 @@ def _hint(name: str, packages: PackageIndex) -> str:
     return "; give its path, or a package and a file: rosz launch PACKAGE FILE"
 
 
-def _control(words: Sequence[str], asked: Mapping[str, str | None], *, as_json: bool) -> None:
-    """Print the status of running launches, or act on one of their nodes.
-
-    Args:
-        words: Words of the command line that stand for files.
-        asked: What is asked for, ``status`` or the node of ``restart``, ``stop`` or ``output``.
-        as_json: Whether to print JSON.
-    """
-    from rosz.introspect.connect import command_config
+def _request(action: str, node: str, *, as_json: bool) -> None:
+    """Print the status of running launches, or act on one of their nodes."""
+    from rosz.introspect import command_config
     from rosz.launch.run import StatusClient
     from rosz.session import Session
 
-    (action, node), *more = [(name, value) for name, value in asked.items() if value]
-    if words or more:
-        raise UsageError(
-            "--status, --restart, --stop and --output stand alone: one of them, and no file"
-        )
     environment = Environment.read()
     try:
         session = Session.open(command_config(environment))
@@ -443,20 +438,18 @@ def _control(words: Sequence[str], asked: Mapping[str, str | None], *, as_json: 
 
 
 def _print_status(client: StatusClient, domain: int, *, as_json: bool) -> None:
-    before = {(launch.host, launch.pid): launch for launch in client.statuses()}
+    before = client.running()
     if not before:
         raise LaunchError(f"no launch is running in domain {domain}")
     if as_json:
         print_json(list(before.values()))
         return
     time.sleep(_SAMPLE_SECONDS)
-    for launch in client.statuses():
-        earlier = before.get((launch.host, launch.pid), launch)
-        sys.stdout.write(_table(launch, earlier))
+    for key, launch in client.running().items():
+        sys.stdout.write(_table(launch, before.get(key, launch)))
 
 
 def _table(launch: LaunchStatus, before: LaunchStatus) -> str:
-    """Return the status of a launch as text."""
     head = ("NODE", "STATE", "PID", "RESTARTS", "CPU", "MEMORY", "UPTIME", "MACHINE")
     earlier = {node.name: node.cpu for node in before.nodes}
     seconds = launch.sampled - before.sampled

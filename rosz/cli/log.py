@@ -18,13 +18,11 @@ from rosz.cli.console import (
     warn,
 )
 from rosz.cli.declare import App, Argument, Option, at_least
-from rosz.errors import UsageError
+from rosz.errors import DecodeError, UsageError
 
 if TYPE_CHECKING:
-    from rosz.introspect.rosout import LogFilter
+    from rosz.introspect import LogFilter
     from rosz.session import Sample
-
-__all__ = ("app",)
 
 app = App()
 
@@ -67,7 +65,7 @@ def log_command(
     if words[:1] == ["levels"]:
         _list_levels(call, words[1:], as_json=json)
         return
-    from rosz.introspect.rosout import LogFilter
+    from rosz.introspect import LogFilter
 
     wanted = LogFilter([call.resolve(word, _TOOL) for word in words], level, grep)
     _follow(call, wanted, count, verbose=verbose, as_json=json)
@@ -76,7 +74,7 @@ def log_command(
 def _set_level(call: Call, words: Sequence[str]) -> None:
     if len(words) != _LEVEL_WORDS:
         raise UsageError("expected: rosz log level NODE LOGGER LEVEL")
-    from rosz.introspect.nodes import find_nodes, set_level
+    from rosz.introspect import find_nodes, set_level
     from rosz.node import parse_severity
 
     _, node, logger, level = words
@@ -88,26 +86,24 @@ def _set_level(call: Call, words: Sequence[str]) -> None:
 
 
 def _list_levels(call: Call, nodes: Sequence[str], *, as_json: bool) -> None:
-    from rosz.introspect.nodes import find_nodes, get_levels
+    from rosz.introspect import find_nodes, get_levels
 
     if not nodes:
         raise UsageError("expected: rosz log levels NODE")
-    found: dict[str, dict[str, str]] = {}
+    by_node: dict[str, dict[str, str]] = {}
     names = [call.resolve(node, _TOOL) for node in nodes]
     with call.session_and_survey(names) as (session, survey):
         for name in names:
             for token in find_nodes(survey, name):
-                found[token.node_name] = get_levels(session, token)
-    lines = (f"{one} {level}" for levels in found.values() for one, level in levels.items())
-    print_result(lines, found, as_json=as_json)
+                by_node[token.node_name] = get_levels(session, token)
+    lines = (f"{logger} {level}" for levels in by_node.values() for logger, level in levels.items())
+    print_result(lines, by_node, as_json=as_json)
 
 
 def _follow(
     call: Call, wanted: LogFilter, count: int | None, *, verbose: bool, as_json: bool
 ) -> None:
-    from rosz.errors import DecodeError
-    from rosz.introspect.rosout import format_line, read_line
-    from rosz.introspect.subscribe import subscribe_samples
+    from rosz.introspect import format_line, read_line, subscribe_samples
     from rosz.msgs.rcl_interfaces.msg import Log
 
     color = takes_escapes(sys.stdout) and not os.environ.get("NO_COLOR")

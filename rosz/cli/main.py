@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from rosz.cli.declare import App
 
-__all__ = ("main", "run")
-
 _INTERRUPTED = 130
 _GC_THRESHOLD = 10_000
 """New objects between two garbage collections: imports create many objects and no garbage."""
@@ -86,21 +84,17 @@ def _name_stdout() -> None:
 def _exit(code: int) -> NoReturn:
     """End the process without finalizing the interpreter, where that makes no difference.
 
-    Finalizing takes longer than most commands, and frees what the system frees anyway.
+    Finalizing takes longer than most commands, and the system frees everything anyway.
     """
     threading = sys.modules.get("threading")
-    if threading is not None and not all(one.daemon for one in threading.enumerate()[1:]):
+    if threading is not None and not all(thread.daemon for thread in threading.enumerate()[1:]):
         sys.exit(code)  # this waits for the other threads
-    atexit._run_exitfuncs()  # noqa: SLF001  # the only way to run what sys.exit would run
+    atexit._run_exitfuncs()  # noqa: SLF001  # the only way to run them, as sys.exit does
     os._exit(code)
 
 
 def run(argv: Sequence[str]) -> int:
-    """Run one command line.
-
-    Returns:
-        The exit code; every error of rosz and of the system has been printed as one line.
-    """
+    """Run one command line, print every error as one line, and return the exit code."""
     try:
         return _dispatch(list(argv))
     except RoszError as error:
@@ -156,7 +150,6 @@ def _dispatch(argv: list[str]) -> int:
 
 
 def _overview() -> str:
-    """Return the help of ``rosz``."""
     return (
         "Usage: rosz COMMAND [ARGS]...\n\n"
         "Commands:\n"

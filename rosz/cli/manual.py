@@ -10,8 +10,6 @@ from rosz.cli.commands import COMMANDS, format_rows
 from rosz.cli.declare import App, Argument
 from rosz.errors import NotFoundError, near_miss
 
-__all__ = ("app", "pages", "topics")
-
 _FOLDER = Path(__file__).parents[1] / "share" / "manual"
 
 app = App()
@@ -24,12 +22,12 @@ def pages() -> dict[str, Path]:
 
 def topics() -> dict[str, str]:
     """Return the title of each page of the manual, which is its first heading, by topic."""
-    found = {}
+    titles = {}
     for topic, path in pages().items():
         lines = path.read_text(encoding="utf-8").splitlines()
         headings = (line for line in lines if line.startswith("#"))
-        found[topic] = next(headings, topic).lstrip("# ")
-    return found
+        titles[topic] = next(headings, topic).lstrip("# ")
+    return titles
 
 
 @app.command()
@@ -42,11 +40,11 @@ def help_command(
 
     'rosz help COMMAND' prints what 'rosz COMMAND --help' prints, unless a page has that name.
     """
-    known = pages()
+    paths = pages()
     if not topic:
         sys.stdout.write(f"Usage: rosz help TOPIC\n\nTopics:\n{format_rows(topics().items())}")
-    elif topic in known:
-        sys.stdout.write(known[topic].read_text(encoding="utf-8"))
+    elif topic in paths:
+        sys.stdout.write(paths[topic].read_text(encoding="utf-8"))
     else:
-        hint = near_miss(topic, [*known, *COMMANDS]) or "; 'rosz help' lists the topics"
+        hint = near_miss(topic, [*paths, *COMMANDS]) or "; 'rosz help' lists the topics"
         raise NotFoundError(f"no page of the manual is called '{topic}'{hint}")

@@ -11,13 +11,12 @@ from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_error, print_json, print_lines, print_result, until_stopped
 from rosz.cli.declare import Argument, Json, Option, at_least
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
+from rosz.names import short_type
 
 if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
+    from rosz.introspect import Survey
     from rosz.session import Session
     from rosz.wire import Token
-
-__all__ = ("app",)
 
 app = new_group("List, inspect, ping and kill nodes.")
 
@@ -36,8 +35,7 @@ def list_command(
     json: Json = False,
 ) -> int:
     """List nodes."""
-    from rosz.introspect.nodes import list_nodes
-    from rosz.introspect.topics import in_namespace
+    from rosz.introspect import in_namespace, list_nodes
 
     space = call.resolve(namespace, _TOOL) if namespace else "/"
     survey = call.survey(processes=everything or places or json)
@@ -59,7 +57,7 @@ def info_command(
     json: Json = False,
 ) -> None:
     """Print the topics, services and connections of nodes."""
-    from rosz.introspect.nodes import find_nodes, format_connections, format_node
+    from rosz.introspect import find_nodes, format_connections, format_node
 
     rows: list[dict[str, Any]] = []
     names = [call.resolve(name, _TOOL) for name in nodes]
@@ -78,7 +76,7 @@ def info_command(
 
 
 def _process_text(session: Session, node: Token) -> str:
-    from rosz.introspect.nodes import get_info
+    from rosz.introspect import get_info
 
     try:
         info = get_info(session, node)
@@ -88,8 +86,7 @@ def _process_text(session: Session, node: Token) -> str:
 
 
 def _info_row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> dict[str, Any]:
-    from rosz.introspect.nodes import get_info
-    from rosz.names import short_type
+    from rosz.introspect import get_info
     from rosz.wire import Kind
 
     row: dict[str, Any] = {"name": node.node_name, "session": node.zid}
@@ -121,11 +118,11 @@ def machine_command(
     json: Json = False,
 ) -> None:
     """List the machines that nodes run on, or the nodes on one machine."""
-    from rosz.introspect.nodes import list_nodes, machines, nodes_on_machine
+    from rosz.introspect import list_nodes, machines, nodes_on_machine
 
     nodes = list_nodes(call.survey(processes=True))
-    found = nodes_on_machine(nodes, machine) if machine else machines(nodes)
-    print_result(found, found, as_json=json)
+    listing = nodes_on_machine(nodes, machine) if machine else machines(nodes)
+    print_result(listing, listing, as_json=json)
 
 
 @app.command("ping")
@@ -153,8 +150,7 @@ def ping_command(
 
 
 def _ping_often(call: Call, name: str, count: int | None) -> None:
-    """Ping a node a number of times, or until stopped."""
-    from rosz.introspect.nodes import PING_TIMEOUT, find_nodes
+    from rosz.introspect import PING_TIMEOUT, find_nodes
 
     full = call.resolve(name, _TOOL)
     print_lines([f"rosnode: node is [{full}]"])
@@ -176,7 +172,7 @@ def _ping_often(call: Call, name: str, count: int | None) -> None:
 
 def _ping(session: Session, survey: Survey, node: Token) -> float:
     """Ping a node, print its reply, and return how many milliseconds it took."""
-    from rosz.introspect.nodes import ping
+    from rosz.introspect import ping
 
     taken = ping(session, node) * 1e3
     print_lines([f"reply from {survey.address(node)}\ttime={taken:f}ms"])
@@ -184,8 +180,7 @@ def _ping(session: Session, survey: Survey, node: Token) -> float:
 
 
 def _ping_all(call: Call) -> int:
-    """Ping every node once, and return the exit code."""
-    from rosz.introspect.nodes import PING_TIMEOUT
+    from rosz.introspect import PING_TIMEOUT
 
     with call.session_and_survey() as (session, survey):
         names = sorted(set(survey.view.nodes()))
@@ -216,22 +211,26 @@ def kill_command(
         nodes = _choose(call)
         if not nodes:
             return 0
-    from rosz.introspect.nodes import kill_nodes
-
     wanted = [call.resolve(name, _TOOL) for name in nodes or ()]
     with call.session_and_survey(wanted) as (session, survey):
-        known = sorted(set(survey.view.nodes()))
-        chosen = known if everybody else wanted
-        unknown = [name for name in chosen if name not in known]
+        running = sorted(set(survey.view.nodes()))
+        unknown = [name for name in wanted if name not in running]
         if unknown:
-            listing = ", ".join(f"'{name}'{near_miss(name, known)}" for name in unknown)
+            listing = ", ".join(f"'{name}'{near_miss(name, running)}" for name in unknown)
             raise NotFoundError(f"unknown node(s): {listing}")
-        if not chosen:
-            print_error("No nodes running")
-            return 0
-        several = ["killing:", *(f" * {name}" for name in chosen)]
-        print_lines(several if len(chosen) > 1 else [f"killing {chosen[0]}"])
-        failed = kill_nodes(session, survey, chosen, _REASON)
+        return _kill(session, survey, running if everybody else wanted)
+
+
+def _kill(session: Session, survey: Survey, chosen: list[str]) -> int:
+    """Shut nodes down, report how it went, and return the exit code."""
+    from rosz.introspect import kill_nodes
+
+    if not chosen:
+        print_error("No nodes running")
+        return 0
+    several = ["killing:", *(f" * {name}" for name in chosen)]
+    print_lines(several if len(chosen) > 1 else [f"killing {chosen[0]}"])
+    failed = kill_nodes(session, survey, chosen, _REASON)
     if failed:
         lines = [f" * {name}: {error}" for name, error in failed]
         print_error("\n".join(["ERROR: Failed to kill:", *lines]))

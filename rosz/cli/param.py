@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz import names
@@ -27,10 +28,7 @@ from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, Yam
 
 if TYPE_CHECKING:
     from rosz.params import Change, Difference, Value
-    from rosz.params.remote import ParamClient
-    from rosz.params.replica import Changed, Outcome
-
-__all__ = ("app",)
+    from rosz.params.replica import Changed, Outcome, ParamClient
 
 _TOOL = "rosparam"
 _STDIN = "<stdin>"
@@ -67,11 +65,8 @@ def list_command(
     """List parameters."""
     with _client(call) as client:
         space = "/" if namespace is None else _resolve(call, namespace).rstrip("/") + "/"
-        found = [name for name in client.names() if name.startswith(space)]
-    if json:
-        print_json(found)
-    else:
-        sys.stdout.write("\n".join(found) + "\n")
+        inside = [name for name in client.names() if name.startswith(space)]
+    print_result(["\n".join(inside)], inside, as_json=json)
 
 
 @app.command("get")
@@ -82,20 +77,21 @@ def get_command(
     readable: Annotated[bool, Option("-p", "Print for reading; it may not be valid YAML.")] = False,
     verbose: _Verbose = False,
     json: Json = False,
-) -> int:
+) -> None:
     """Print a parameter, or all parameters below a namespace, as YAML."""
     with _client(call) as client:
         full = _resolve(call, name)
         _log(verbose, [f"getting parameter [{full}]"])
-        try:
-            value = client.get(full)
-        except ParamNotFound as error:
-            return _fail_not_set("Parameter", error)
+        value = client.get(full)
     if json:
         print_json(value)
     else:
-        sys.stdout.write(_format_scalar(value) or _format_yaml(value, readable=readable))
-    return 0
+        text = _format_scalar(value)
+        if not text:
+            from rosz.params.yaml import format_get, pretty
+
+            text = pretty(value) if readable else format_get(value)
+        sys.stdout.write(text)
 
 
 @app.command("set", arrange=values_last("-t", "--textfile", "-b", "--binfile"))
@@ -124,24 +120,20 @@ def set_command(
 
     with _client(call) as client:
         full = _resolve(call, name)
-        found = _read_value(value, text_file, binary_file)
-        changes = condense(spread(full, normalise(found, full)))
+        content = _read_value(value, text_file, binary_file)
+        changes = condense(spread(full, normalise(content, full)))
         _warn_slow(client, client.write(changes))
     _log(verbose, (f"set parameter [/{'/'.join(path)}] to [{item}]" for path, item in changes))
 
 
 @app.command("delete")
-def delete_command(call: Call, name: _Name, *, verbose: _Verbose = False) -> int:
+def delete_command(call: Call, name: _Name, *, verbose: _Verbose = False) -> None:
     """Delete a parameter and all parameters below it."""
-    with _client(call) as client:
+    with _client(call, "parameter") as client:
         full = _resolve(call, name)
-        try:
-            _warn_slow(client, client.delete(full))
-        except ParamNotFound as error:
-            return _fail_not_set("parameter", error)
+        _warn_slow(client, client.delete(full))
     what = "ENTIRE parameter server" if full == "/" else f"parameter [{full}]"
     _log(verbose, [f"deleted {what}"])
-    return 0
 
 
 @app.command("dump")
@@ -152,7 +144,7 @@ def dump_command(
     *,
     verbose: _Verbose = False,
     json: Json = False,
-) -> int:
+) -> None:
     """Write parameters to a file as YAML."""
     from rosz.params import leaves, split
     from rosz.params.yaml import dump
@@ -160,10 +152,7 @@ def dump_command(
     with _client(call) as client:
         full = _resolve(call, namespace)
         _log(verbose, [f"dumping namespace [{namespace}] to file [{file or None}]"])
-        try:
-            value = client.get(full)
-        except ParamNotFound as error:
-            return _fail_not_set("Parameter", error)
+        value = client.get(full)
     _log(verbose, _format_leaves(value, leaves(value, split(full))))
     if json:
         print_json(value)
@@ -172,7 +161,6 @@ def dump_command(
     else:
         _check_target(file)
         write_file(file, dump(value).encode())
-    return 0
 
 
 @app.command("load")
@@ -202,7 +190,10 @@ def load_command(
         set_by = [list(spread(space, value)) for space, value in documents]
         changes = condense(change for each in set_by for change in each)
         if dry_run:
-            _print_preview(preview(client.get("/"), changes), as_json=json)
+            differences = preview(client.get("/"), changes)
+            print_result(map(_change_line, differences), differences, as_json=json)
+            if not json:
+                print_error(f"{len(differences)} parameters would change; nothing is written")
             return
         _warn_slow(client, client.write(changes))
     for (_, value), each in zip(documents, set_by, strict=True):
@@ -219,9 +210,9 @@ def search_command(
 ) -> int:
     """Print the full name of a parameter, searched in a namespace and then in those above it."""
     with _client(call) as client:
-        found = client.search(name, _resolve(call, namespace))
-    print_result([] if found is None else [found], found, as_json=json)
-    if found is None:
+        full = client.search(name, _resolve(call, namespace))
+    print_result([] if full is None else [full], full, as_json=json)
+    if full is None:
         print_error(f"ERROR: Cannot find parameter [{name}] in an upwards search")
         return 1
     return 0
@@ -239,7 +230,7 @@ def watch_command(
     at_least("-n", count, 1, "changes")
     from queue import SimpleQueue
 
-    from rosz.params.remote import ParamClient
+    from rosz.params.replica import ParamClient
 
     changes: SimpleQueue[Changed] = SimpleQueue()
     with until_stopped() as ready, call.context(lasting=True) as context:
@@ -249,15 +240,23 @@ def watch_command(
             ready()
             print_error(f"watching [{full}]; press Ctrl-C to end")
             for change in islice(iter(changes.get, None), count):
-                _print_change(change, as_json=json)
+                if json:
+                    print_json_line(change)
+                else:
+                    print_lines([_change_line(change)])
 
 
 @contextmanager
-def _client(call: Call) -> Iterator[ParamClient]:
-    from rosz.params.remote import ParamClient
+def _client(call: Call, word: str = "Parameter") -> Iterator[ParamClient]:
+    """Open a client; say in rosparam's words that a parameter is not set."""
+    from rosz.params.replica import ParamClient
 
-    with call.session() as session:
-        yield ParamClient(session, call.domain)
+    try:
+        with call.session() as session:
+            yield ParamClient(session, call.domain)
+    except ParamNotFound as error:
+        hint = str(error).partition(" is not set")[2]
+        raise NotFoundError(f"{word} [{error.name}] is not set{hint}") from error
 
 
 def _resolve(call: Call, name: str) -> str:
@@ -267,15 +266,14 @@ def _resolve(call: Call, name: str) -> str:
 
 
 def _read_value(value: str | None, text_file: str, binary_file: str) -> Value:
-    """Return the value to set."""
     if binary_file:
         return _read_bytes(binary_file, UsageError)
     if text_file:
         return _decode(_read_bytes(text_file, UsageError), text_file)
     word = value or ""
-    found = _parse_scalar(word)
-    if found is not None:
-        return found
+    scalar = _parse_scalar(word)
+    if scalar is not None:
+        return scalar
     from rosz.params.yaml import load
 
     return load(_read_stdin(), _STDIN) if word == "-" else load(word, "<value>")
@@ -301,19 +299,11 @@ def _format_scalar(value: Value) -> str:
     return ""
 
 
-def _format_yaml(value: Value, *, readable: bool) -> str:
-    from rosz.params.yaml import format_get, pretty
-
-    return pretty(value) if readable else format_get(value)
-
-
 def _read_stdin() -> str:
     return _decode(sys.stdin.buffer.read(), _STDIN)
 
 
 def _read_bytes(file: str, error: type[RoszError]) -> bytes:
-    from pathlib import Path
-
     if not Path(file).is_file():
         what = "is not a regular file" if Path(file).exists() else "does not exist"
         raise error(f"file '{file}' {what}")
@@ -334,42 +324,20 @@ def _check_target(file: str) -> None:
 
     Links of the system, such as ``/dev/stdout`` and those to the pipes of a shell, are followed.
     """
-    from pathlib import Path
-
     folder = Path(file).absolute().parent.resolve().parts
     if Path(file).is_symlink() and folder != ("/", "dev") and folder[:2] != ("/", "proc"):
         raise UsageError(f"'{file}' is a link to '{Path(file).readlink()}'; name the file itself")
 
 
-def _print_preview(differences: list[Difference], *, as_json: bool) -> None:
-    lines = (_change_line(found.name, found.old, found.new) for found in differences)
-    print_result(lines, differences, as_json=as_json)
-    if not as_json:
-        print_error(f"{len(differences)} parameters would change; nothing is written")
-
-
-def _print_change(change: Changed, *, as_json: bool) -> None:
-    if as_json:
-        print_json_line(change)
-    else:
-        print_lines([_change_line(change.name, change.old, change.new)])
-
-
-def _change_line(name: str, old: Value | None, new: Value | None) -> str:
+def _change_line(change: Changed | Difference) -> str:
     from rosz.params.yaml import inline
 
+    name, old, new = change.name, change.old, change.new
     if old is None:
         return f"+ {name}: {inline(new)}"
     if new is None:
         return f"- {name}: {inline(old)}"
     return f"~ {name}: {inline(old)} -> {inline(new)}"
-
-
-def _fail_not_set(word: str, error: ParamNotFound) -> int:
-    """Print in rosparam's words that a parameter is not set, and return the exit code."""
-    hint = str(error).partition(" is not set")[2]
-    print_error(f"ERROR: {word} [{error.name}] is not set{hint}")
-    return 1
 
 
 def _format_leaves(value: Value, changes: Iterable[Change]) -> Iterator[str]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
 from rosz.cli.console import (
@@ -18,14 +20,12 @@ from rosz.cli.console import (
     warn,
 )
 from rosz.cli.declare import App, Argument, Json, Option
+from rosz.environment import Environment, package_index
 from rosz.errors import NotFoundError
 
 if TYPE_CHECKING:
-    from rosz.environment import Environment
     from rosz.packages import Package, PackageIndex
     from rosz.workspace import Checked, Migration, Problem
-
-__all__ = ("app",)
 
 app = App("List, find, create and check packages.")
 
@@ -51,8 +51,8 @@ def list_packages(
     packages = index.packages()
     for fault in index.broken:
         warn(str(fault))
-    lines = (one.name if names else f"{one.name} {one.path}" for one in packages)
-    print_result(lines, {one.name: str(one.path) for one in packages}, as_json=json)
+    lines = (package.name if names else f"{package.name} {package.path}" for package in packages)
+    print_result(lines, {package.name: str(package.path) for package in packages}, as_json=json)
 
 
 @app.command("find")
@@ -91,8 +91,14 @@ def create_package(
         maintainer=maintainer,
         license_name=license_name,
     )
-    if bare:
-        _print_created(made, Path.cwd())
+    if bare:  # in the words of catkin_create_pkg
+        for path in made:
+            kind = "folder" if path.is_dir() else "file"
+            print_lines([f"Created {kind} {path.relative_to(Path.cwd())}"])
+        where = made[0].parent
+        print_lines(
+            [f"Successfully created files in {where}. Please adjust the values in package.xml."]
+        )
     index = _index()
     for dependency in dependencies or []:
         if dependency not in index.names() and dependency not in _BUILT_IN:
@@ -102,19 +108,8 @@ def create_package(
         print_lines([f"created {made[0].parent}", f"run it with: rosz launch {file}"])
 
 
-def _print_created(made: Sequence[Path], parent: Path) -> None:
-    """Print what has been created, in the words of catkin_create_pkg."""
-    for path in made:
-        print_lines([f"Created {'folder' if path.is_dir() else 'file'} {path.relative_to(parent)}"])
-    where = made[0].parent
-    print_lines(
-        [f"Successfully created files in {where}. Please adjust the values in package.xml."]
-    )
-
-
 def _workspace() -> Package:
     """Return the first folder of the package path, where ``roscd`` alone goes."""
-    from rosz.environment import Environment
     from rosz.packages import Package
 
     for root in Environment.read().package_roots:
@@ -127,8 +122,6 @@ def _workspace() -> Package:
 
 
 def _index() -> PackageIndex:
-    from rosz.environment import Environment, package_index
-
     return package_index(Environment.read())
 
 
@@ -156,10 +149,7 @@ def check_command(
     The exit code is 1 if there is an error; with --migrate, if something does not run here.
     Options and targets of catkin_make are ignored.
     """
-    import os
-
-    from rosz.environment import Environment, package_index
-    from rosz.workspace import check, find_packages
+    from rosz.workspace import check, editor_folder, find_packages, write_stubs
 
     cwd = Path.cwd()
     environment = Environment.read()
@@ -172,35 +162,28 @@ def check_command(
         print_json(checked)
     else:
         checked = _print_checked(done, len(folders), cwd, colored=environment.color)
-    _refresh_editor(environment)
+    if editor_folder(environment).is_dir():  # 'rosz env --editor' has written it once
+        write_stubs(environment)
     if setup:
         _write_setup(cwd)
-    return int(any(one.level == "error" for each in checked for one in each.problems))
-
-
-def _refresh_editor(environment: Environment) -> None:
-    """Write what editors need anew, if ``rosz env --editor`` has written it once."""
-    from rosz.workspace.editor import editor_folder, write_stubs
-
-    if editor_folder(environment).is_dir():
-        write_stubs(environment)
+    return int(any(problem.level == "error" for each in checked for problem in each.problems))
 
 
 def _without_options(words: Sequence[str], cwd: Path) -> list[str]:
     """Leave out the words that tell catkin_make how to build."""
-    found: list[str] = []
+    targets: list[str] = []
     before = ""
     for word in words:
         counts = before in {"-j", "-l"} and word.isdecimal()
         target = word in _CATKIN_TARGETS and not (cwd / word).is_dir()
         if not word.startswith("-") and not counts and not target:
-            found.append(word)
+            targets.append(word)
         before = word
-    return found
+    return targets
 
 
 def _follow(done: Iterable[Checked], total: int) -> list[Checked]:
-    """Return what was checked; a terminal shows how far it is."""
+    """Return the checked packages; a terminal shows the progress."""
     terminal = takes_escapes(sys.stderr)
     checked: list[Checked] = []
     for each in done:
@@ -222,16 +205,16 @@ def _print_checked(
     """
     checked = _follow(done, total)
     colored = colored and takes_escapes(sys.stdout)
-    problems = {one for each in checked for one in each.problems}
-    plain = [one for one in problems if not one.missing]
+    problems = {problem for each in checked for problem in each.problems}
+    plain = [problem for problem in problems if not problem.missing]
     places: dict[tuple[str, str], list[Problem]] = {}
-    for one in sorted(plain, key=lambda one: (one.level, one)):
-        places.setdefault((one.level, one.text), []).append(one)
+    for problem in sorted(plain, key=lambda problem: (problem.level, problem)):
+        places.setdefault((problem.level, problem.text), []).append(problem)
     for same in places.values():
         sys.stdout.write(_format_problem(same, cwd, colored=colored))
     absent = _absent(checked)
     print_lines(absent)
-    errors = sum(one.level == "error" for one in problems)
+    errors = sum(problem.level == "error" for problem in problems)
     counts = f"{count(errors, 'error')}, {count(len(plain) - errors, 'warning')}"
     more = f", {count(len(absent), 'package')} not there" if absent else ""
     verdict = "" if errors or absent else "; nothing needs building"
@@ -245,9 +228,9 @@ def _absent(checked: Iterable[Checked]) -> list[str]:
 
     needed: dict[str, dict[str, None]] = {}
     for each in checked:
-        for one in each.problems:
-            if one.missing:
-                needed.setdefault(one.missing, {})[each.name] = None
+        for problem in each.problems:
+            if problem.missing:
+                needed.setdefault(problem.missing, {})[each.name] = None
     lines: list[str] = []
     for name, users in sorted(needed.items()):
         instead = instead_of(name)
@@ -267,52 +250,32 @@ def _listed(names: Sequence[str]) -> str:
 def _print_migration(
     folders: Sequence[Path], environment: Environment, checked: Sequence[Checked], *, as_json: bool
 ) -> int:
-    """Print what of the packages runs here; return 0 if all of it does."""
+    """Print which programs of packages run here; return 0 if all of them do."""
     from rosz.workspace import migrate
 
     errors = {
-        each.name: found
+        each.name: number
         for each in checked
         if (
-            found := sum(
-                one.level == "error" and "Python 2" not in one.text for one in each.problems
+            number := sum(
+                problem.level == "error" and "Python 2" not in problem.text
+                for problem in each.problems
             )
         )
     }
     page = migrate(folders, environment, errors)
-    if as_json:
-        print_json(page)
-    else:
-        print_lines([*_page(page, Path.cwd()), *_absent(checked)])
+    print_result([*_page(page, Path.cwd()), *_absent(checked)], page, as_json=as_json)
     return int(not page.runs)
 
 
 def _page(page: Migration, cwd: Path) -> Iterator[str]:
     programs = page.programs
-    good = sum(one.runs for one in programs)
+    good = sum(program.runs for program in programs)
     yield f"{count(page.packages, 'package')}, {count(len(programs), 'Python program')}"
     yield f"runs here as it is: {good} of {len(programs)}"
-    for title, attribute in (
-        ("needs pip install", "install"),
-        ("needs a module that is not there", "missing"),
-    ):
-        needs: dict[str, dict[str, None]] = {}
-        for one in programs:
-            for need in getattr(one, attribute):
-                needs.setdefault(need, {})[f"{one.package}/{Path(one.path).name}"] = None
-        users = {name for found in needs.values() for name in found}
-        yield f"{title}: {len(users)}"
-        for need, found in sorted(needs.items(), key=lambda item: (-len(item[1]), item[0])):
-            yield f"    {need}: {_listed(list(found))}"
-    old: dict[str, dict[str, str]] = {}
-    for place in (place for one in programs for place in one.python2):
-        file, line, what = place.split(":", 2)
-        old.setdefault(_shorten(file, cwd), {})[line] = what.strip()
-    count_old = sum(bool(one.python2) for one in programs)
-    yield f"is Python 2: {count_old}" + ("; convert with: 2to3 -w FILE" if old else "")
-    for file, lines in old.items():
-        numbers = ", ".join(sorted(lines, key=int))
-        yield f"    {file}: line {numbers}: {'; '.join(dict.fromkeys(lines.values()))}"
+    yield from _needs(programs, "needs pip install", "install")
+    yield from _needs(programs, "needs a module that is not there", "missing")
+    yield from _python2(programs, cwd)
     compiled = sum(map(len, page.compiled.values()))
     yield f"is C++: {compiled}" + (
         "; rosz builds and runs no C++: it stays with ROS 1, or becomes a node of ROS 2 beside rosz"
@@ -325,8 +288,31 @@ def _page(page: Migration, cwd: Path) -> Iterator[str]:
     yield from (f"    {name}: {number}" for name, number in sorted(page.errors.items()))
 
 
+def _needs(programs: Iterable[Any], title: str, attribute: str) -> Iterator[str]:
+    """Yield how many programs need something that is not there, and who needs each thing."""
+    needs: dict[str, dict[str, None]] = {}
+    for program in programs:
+        for need in getattr(program, attribute):
+            needs.setdefault(need, {})[f"{program.package}/{Path(program.path).name}"] = None
+    yield f"{title}: {len({name for users in needs.values() for name in users})}"
+    for need, users in sorted(needs.items(), key=lambda item: (-len(item[1]), item[0])):
+        yield f"    {need}: {_listed(list(users))}"
+
+
+def _python2(programs: Iterable[Any], cwd: Path) -> Iterator[str]:
+    """Yield how many programs are Python 2, and the lines that show it."""
+    places = [program.python2 for program in programs if program.python2]
+    old: dict[str, dict[str, str]] = {}
+    for place in itertools.chain.from_iterable(places):
+        file, line, what = place.split(":", 2)
+        old.setdefault(_shorten(file, cwd), {})[line] = what.strip()
+    yield f"is Python 2: {len(places)}" + ("; convert with: 2to3 -w FILE" if old else "")
+    for file, lines in old.items():
+        numbers = ", ".join(sorted(lines, key=int))
+        yield f"    {file}: line {numbers}: {'; '.join(dict.fromkeys(lines.values()))}"
+
+
 def _format_problem(same: Sequence[Problem], cwd: Path, *, colored: bool) -> str:
-    """Return a line for problems of one text."""
     problem = same[0]
     level = paint(problem.level, problem.level) if colored else problem.level
     more = f" ({count(len(same), 'place')} like this)" if len(same) > 1 else ""
@@ -334,7 +320,6 @@ def _format_problem(same: Sequence[Problem], cwd: Path, *, colored: bool) -> str
 
 
 def _shorten(place: str, cwd: Path) -> str:
-    """Shorten a path below the working folder."""
     return place.removeprefix(f"{cwd}/")
 
 

@@ -1,17 +1,16 @@
 """Read a simple command line from the declarations of its command, without typer.
 
 All other lines (an unknown option, a missing argument, ``--help``, letters of options run together)
-are left to typer, which knows what they mean or what is wrong with them.
+are left to typer, which knows their meaning or explains their faults.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
-from rosz.cli.declare import App, Argument, Command, Parameter
-
-__all__ = ("read",)
+from rosz.cli.declare import App, Argument, Command, CommandParameter
 
 _END_OF_OPTIONS = "--"
 
@@ -33,19 +32,19 @@ def read(app: App, argv: Sequence[str]) -> Callable[[], Any] | None:
         _assign(parameters, positional, values)
     except _NotSimple:
         return None
-    for one in parameters:
-        if one.mark is None:
-            values[one.name] = one.kind(remappings)
-        elif one.required and one.name not in values:
-            return None
-    return lambda: command.function(**values)
+    if any(parameter.required and parameter.name not in values for parameter in parameters):
+        return None
+    return partial(command.run, values, remappings)
 
 
 def _read_options(
-    command: Command, parameters: Sequence[Parameter], words: Sequence[str], values: dict[str, Any]
+    command: Command,
+    parameters: Sequence[CommandParameter],
+    words: Sequence[str],
+    values: dict[str, Any],
 ) -> list[str]:
     """Read the options among the words into values, and return the positional words."""
-    options = {word: one for one in parameters for word in one.spellings}
+    options = {word: parameter for parameter in parameters for word in parameter.spellings}
     positional: list[str] = []
     left = iter(words)
     for word in left:
@@ -53,10 +52,10 @@ def _read_options(
             positional += left
         elif word.startswith("-") and word != "-":
             name, given, text = word.partition("=") if word.startswith("--") else (word, "", "")
-            one = options.get(name)
-            if one is None:
+            parameter = options.get(name)
+            if parameter is None:
                 raise _NotSimple
-            _read_option(one, text if given else None, left, values)
+            _read_option(parameter, text if given else None, left, values)
         else:
             positional.append(word)
             if not command.interspersed:
@@ -65,38 +64,40 @@ def _read_options(
 
 
 def _read_option(
-    one: Parameter, text: str | None, left: Iterator[str], values: dict[str, Any]
+    parameter: CommandParameter, text: str | None, left: Iterator[str], values: dict[str, Any]
 ) -> None:
-    if one.kind is bool:
+    if parameter.kind is bool:
         if text is not None:
             raise _NotSimple
-        values[one.name] = True
+        values[parameter.name] = True
         return
     if text is None:
         text = next(left, _END_OF_OPTIONS)
         if text.startswith("-") and text != "-":
             raise _NotSimple
-    value = _convert(one, text)
-    if one.many:
-        values.setdefault(one.name, []).append(value)
+    value = _convert(parameter, text)
+    if parameter.many:
+        values.setdefault(parameter.name, []).append(value)
     else:
-        values[one.name] = value
+        values[parameter.name] = value
 
 
-def _assign(parameters: Sequence[Parameter], words: Sequence[str], values: dict[str, Any]) -> None:
+def _assign(
+    parameters: Sequence[CommandParameter], words: Sequence[str], values: dict[str, Any]
+) -> None:
     """Assign positional words to the arguments in turn; a list takes all that are left."""
-    for one in parameters:
-        if words and isinstance(one.mark, Argument):
-            taken = words if one.many else words[:1]
-            found = [_convert(one, word) for word in taken]
-            values[one.name] = found if one.many else found[0]
+    for parameter in parameters:
+        if words and isinstance(parameter.mark, Argument):
+            taken = words if parameter.many else words[:1]
+            converted = [_convert(parameter, word) for word in taken]
+            values[parameter.name] = converted if parameter.many else converted[0]
             words = words[len(taken) :]
     if words:
         raise _NotSimple
 
 
-def _convert(one: Parameter, word: str) -> Any:
+def _convert(parameter: CommandParameter, word: str) -> Any:
     try:
-        return one.kind(word)
+        return parameter.kind(word)
     except ValueError:
         raise _NotSimple from None

@@ -6,7 +6,10 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
+
+from msgspec import Struct
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
@@ -27,8 +30,6 @@ if TYPE_CHECKING:
     from rosz.graph import View
     from rosz.reconfigure import Client, Config, Description, Group, Setting
 
-__all__ = ("app",)
-
 app = new_group("Read and change settings of nodes while they run (dynamic_reconfigure).")
 
 _TOOL = "dynparam"
@@ -37,17 +38,22 @@ _QUIET_SECONDS = 1.0
 """Time to wait for a node before saying so."""
 _FOR_EVER = 1e9
 
-_Node = Annotated[str, Argument("NODE", source=suggest.nodes)]
 _Setting = Annotated[str, Argument("SETTING", "All settings if omitted.")]
-_Timeout = Annotated[
-    float | None,
-    Option(
-        "-t --timeout SECONDS",
-        "Time limit to wait for the node and for its reply. Without it the node must be"
-        " running, and reply within 10 seconds.",
-    ),
-]
-_Wait = Annotated[bool, Option("--wait", "Wait until the node runs.")]
+
+
+class SettingsNode(Struct, frozen=True, kw_only=True):
+    """The node whose settings a command reads or changes, and how long it waits for that node."""
+
+    node: Annotated[str, Argument("NODE", source=suggest.nodes)]
+    timeout: Annotated[
+        float | None,
+        Option(
+            "-t --timeout SECONDS",
+            "Time limit to wait for the node and for its reply. Without it the node must be"
+            " running, and reply within 10 seconds.",
+        ),
+    ] = None
+    wait: Annotated[bool, Option("--wait", "Wait until the node runs.")] = False
 
 
 @app.command("list")
@@ -55,25 +61,19 @@ def list_command(call: Call, *, json: Json = False) -> None:
     """List the nodes that have settings."""
     from rosz.reconfigure import find_servers
 
-    found = find_servers(call.survey().view)
-    print_result(found, found, as_json=json)
+    servers = find_servers(call.survey().view)
+    print_result(servers, servers, as_json=json)
 
 
 @app.command("get")
 def get_command(
-    call: Call,
-    node: _Node,
-    setting: _Setting = "",
-    *,
-    timeout: _Timeout = None,
-    wait: _Wait = False,
-    json: Json = False,
+    call: Call, target: SettingsNode, setting: _Setting = "", *, json: Json = False
 ) -> None:
     """Print all settings of a node as dynparam does, or the value of one setting."""
     from rosz.params.yaml import format_get
     from rosz.reconfigure.messages import decode_description, in_groups, pack_description
 
-    with _client(call, node, timeout, wait=wait) as client:
+    with _client(call, target) as client:
         description, config = client.description(), client.config()
     if setting:
         value = config[description.setting(setting).name]
@@ -91,33 +91,24 @@ def get_command(
 @app.command("set", arrange=values_last("-t", "--timeout"))
 def set_command(
     call: Call,
-    node: _Node,
+    target: SettingsNode,
     setting: Annotated[str, Argument("SETTING|YAML", "One setting, or a dictionary of several.")],
     value: Annotated[str | None, Argument("VALUE", "The value of one setting.")] = None,
     *,
-    timeout: _Timeout = None,
-    wait: _Wait = False,
     json: Json = False,
 ) -> None:
     """Change settings of a node; a choice can be given by its name."""
     from rosz.reconfigure import load
 
-    with _client(call, node, timeout, wait=wait) as client:
+    with _client(call, target) as client:
         changes = load(setting, "<value>") if value is None else {setting: value}
         _change(client, changes, as_json=json)
 
 
 @app.command("set_from_parameters")
-def set_from_parameters_command(
-    call: Call,
-    node: _Node,
-    *,
-    timeout: _Timeout = None,
-    wait: _Wait = False,
-    json: Json = False,
-) -> None:
+def set_from_parameters_command(call: Call, target: SettingsNode, *, json: Json = False) -> None:
     """Change settings of a node to the private parameters of this command, such as _gain:=2."""
-    with _client(call, node, timeout, wait=wait) as client:
+    with _client(call, target) as client:
         changes: dict[str, Any] = client.node.params.get("~", {})
         if not changes:
             raise NotFoundError(
@@ -130,16 +121,13 @@ def set_from_parameters_command(
 @app.command("dump")
 def dump_command(
     call: Call,
-    node: _Node,
+    target: SettingsNode,
     file: Annotated[str, Argument("FILE", "'-' is standard output.", suggest.files)],
-    *,
-    timeout: _Timeout = None,
-    wait: _Wait = False,
 ) -> None:
     """Write all settings of a node to a YAML file."""
     from rosz.reconfigure import dump
 
-    with _client(call, node, timeout, wait=wait) as client:
+    with _client(call, target) as client:
         text = dump(client.config())
     if file == "-":
         sys.stdout.write(text)
@@ -150,36 +138,26 @@ def dump_command(
 @app.command("load")
 def load_command(
     call: Call,
-    node: _Node,
+    target: SettingsNode,
     file: Annotated[str, Argument("FILE", "'-' is standard input.", suggest.files)],
     *,
-    timeout: _Timeout = None,
-    wait: _Wait = False,
     json: Json = False,
 ) -> None:
     """Change settings of a node to those in a YAML file, also one written by ROS 1's dynparam."""
-    from pathlib import Path
-
     from rosz.reconfigure import load
 
     text = sys.stdin.read() if file == "-" else Path(file).read_text(encoding="utf-8")
     changes = load(text, "<stdin>" if file == "-" else file)
-    with _client(call, node, timeout, wait=wait) as client:
+    with _client(call, target) as client:
         _change(client, changes, as_json=json)
 
 
 @app.command("describe")
 def describe_command(
-    call: Call,
-    node: _Node,
-    setting: _Setting = "",
-    *,
-    timeout: _Timeout = None,
-    wait: _Wait = False,
-    json: Json = False,
+    call: Call, target: SettingsNode, setting: _Setting = "", *, json: Json = False
 ) -> None:
     """Print the types, values, bounds, choices and groups of the settings of a node."""
-    with _client(call, node, timeout, wait=wait) as client:
+    with _client(call, target) as client:
         description, config = client.description(), client.config()
     _print_description(description, config, setting, as_json=json)
 
@@ -187,22 +165,19 @@ def describe_command(
 @app.command("watch")
 def watch_command(
     call: Call,
-    node: _Node,
     *,
     count: Annotated[int | None, Option("-n COUNT", "Stop after this number of changes.")] = None,
-    timeout: _Timeout = None,
-    wait: _Wait = False,
+    target: SettingsNode,
     json: Json = False,
 ) -> None:
     """Print changes of the settings of a node as they happen."""
     at_least("-n", count, 1, "changes")
     from queue import SimpleQueue
 
+    from rosz.params.yaml import inline
+
     configs: SimpleQueue[Config] = SimpleQueue()
-    with (
-        until_stopped() as ready,
-        _client(call, node, timeout, wait=wait, lasting=True) as client,
-    ):
+    with until_stopped() as ready, _client(call, target, lasting=True) as client:
         ready()
         before = _flatten(client.config())
         client.config_callback = configs.put
@@ -212,34 +187,31 @@ def watch_command(
             now = _flatten(configs.get())
             changed = [name for name in now if now[name] != before.get(name)]
             for name in changed[:left]:
-                _print_change(name, before.get(name), now[name], as_json=json)
+                old, new = before.get(name), now[name]
+                if json:
+                    print_json_line({"name": name, "old": old, "new": new})
+                else:
+                    print_lines([f"~ {name}: {inline(old)} -> {inline(new)}"])
             left = None if left is None else left - len(changed)
             before = now
 
 
 @contextmanager
-def _client(
-    call: Call,
-    name: str,
-    timeout: float | None,
-    *,
-    wait: bool,
-    lasting: bool = False,
-) -> Iterator[Client]:
-    """Open a client of a node's settings."""
+def _client(call: Call, target: SettingsNode, *, lasting: bool = False) -> Iterator[Client]:
+    timeout, wait = target.timeout, target.wait
     if timeout is not None:
         seconds("--timeout", timeout)
     from rosz.node import Node
     from rosz.reconfigure import Client
 
-    full = call.resolve(name, _TOOL)
+    full = call.resolve(target.node, _TOOL)
     with (
         call.context(lasting=lasting or wait) as ros,
         Node(_TOOL, anonymous=True, context=ros) as node,
         Client(node, full, timeout=timeout or _TIMEOUT) as client,
     ):
         if wait or timeout is not None:
-            _wait_for(client, _FOR_EVER if wait else timeout or _TIMEOUT)
+            _wait_for(client, _FOR_EVER if wait else client.timeout)
         else:
             ros.graph.find(partial(_check_served, client.name))
         yield client
@@ -253,9 +225,9 @@ def _check_served(name: str, view: View) -> None:
     """
     from rosz.reconfigure import find_servers
 
-    known = find_servers(view)
-    if name not in known:
-        hint = near_miss(name, known) or "; 'rosz reconfigure list' lists them"
+    servers = find_servers(view)
+    if name not in servers:
+        hint = near_miss(name, servers) or "; 'rosz reconfigure list' lists them"
         raise NotFoundError(f"no node has settings under '{name}'{hint}")
 
 
@@ -283,7 +255,6 @@ def _change(client: Client, changes: Mapping[str, Any], *, as_json: bool) -> Non
 def _print_description(
     description: Description, config: Config, only: str, *, as_json: bool
 ) -> None:
-    """Print all settings, or one of them, with their values."""
     if only:
         setting = description.setting(only)
         lines = _describe(setting, config, "")
@@ -356,12 +327,3 @@ def _states(tree: Config, place: str) -> Iterator[tuple[str, bool]]:
     for name, inner in tree["groups"].items():
         yield f"{place}/{name}", inner["state"]
         yield from _states(inner, f"{place}/{name}")
-
-
-def _print_change(name: str, old: Any, new: Any, *, as_json: bool) -> None:
-    if as_json:
-        print_json_line({"name": name, "old": old, "new": new})
-        return
-    from rosz.params.yaml import inline
-
-    print_lines([f"~ {name}: {inline(old)} -> {inline(new)}"])

@@ -17,8 +17,6 @@ from rosz.cli.console import print_error
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import LaunchError, UsageError
 
-__all__ = ("app",)
-
 app = App()
 
 
@@ -64,8 +62,8 @@ def run_command(
     With --with, several run in one process (rosz help containers).
     """
     from rosz.environment import Environment, package_index
-    from rosz.launch.run.command import Workplace, container_of
-    from rosz.launch.run.command import run_command as make_command
+    from rosz.launch.run import Workplace, container_of
+    from rosz.launch.run import run_command as make_command
 
     if not package:
         raise UsageError("no package is given: rosz run PACKAGE EXECUTABLE [ARGS]")

@@ -13,12 +13,11 @@ from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result, until_stopped, warn
 from rosz.cli.declare import Argument, Json, Option, seconds, values_last
 from rosz.errors import EncodeError, RoszError, UsageError
+from rosz.names import short_type
 
 if TYPE_CHECKING:
     from rosz.node import Client
     from rosz.wire import Token
-
-__all__ = ("app",)
 
 app = new_group("List and call services.")
 
@@ -38,26 +37,28 @@ def list_command(
     json: Json = False,
 ) -> int:
     """List services."""
-    from rosz.introspect.services import list_services
-    from rosz.introspect.topics import in_namespace
+    from rosz.introspect import in_namespace, list_services
 
     space = call.resolve(namespace, _TOOL) if namespace else "/"
-    found = [one for one in list_services(call.survey().view) if in_namespace(one.name, space)]
+    services = [
+        service
+        for service in list_services(call.survey().view)
+        if in_namespace(service.name, space)
+    ]
     lines = (
-        one.name
-        + (f" [{', '.join(one.types)}]" if types else "")
-        + (f" {','.join(one.nodes)}" if nodes else "")
-        for one in found
+        service.name
+        + (f" [{', '.join(service.types)}]" if types else "")
+        + (f" {','.join(service.nodes)}" if nodes else "")
+        for service in services
     )
-    print_result(lines, found, as_json=json)
+    print_result(lines, services, as_json=json)
     return int(call.incomplete)
 
 
 @app.command("info")
 def info_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the node, the type and the arguments of a service."""
-    from rosz.introspect.services import service_key
-    from rosz.names import short_type
+    from rosz.introspect import service_key
 
     token = _server(call, service)
     arguments = _arguments(call, token)
@@ -74,8 +75,6 @@ def info_command(call: Call, service: _ServiceName, *, json: Json = False) -> No
 @app.command("type")
 def type_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the type of a service."""
-    from rosz.names import short_type
-
     name = short_type(_server(call, service).type_name)
     print_result([name], {"type": name}, as_json=json)
 
@@ -88,10 +87,10 @@ def find_command(
     json: Json = False,
 ) -> None:
     """List the services of a type."""
-    from rosz.introspect.services import services_of_type
+    from rosz.introspect import services_of_type
 
-    found = services_of_type(call.survey().view, type_name)
-    print_result(found, found, as_json=json)
+    names = services_of_type(call.survey().view, type_name)
+    print_result(names, names, as_json=json)
 
 
 @app.command("args")
@@ -112,14 +111,14 @@ def node_command(call: Call, service: _ServiceName, *, json: Json = False) -> No
 @app.command("uri")
 def uri_command(call: Call, service: _ServiceName, *, json: Json = False) -> None:
     """Print the Zenoh key of a service."""
-    from rosz.introspect.services import service_key
+    from rosz.introspect import service_key
 
     key = service_key(_server(call, service))
     print_result([key], {"uri": key}, as_json=json)
 
 
 def _server(call: Call, service: str) -> Token:
-    from rosz.introspect.services import find_server
+    from rosz.introspect import find_server
 
     return find_server(call.survey().view, call.resolve(service, _TOOL))
 
@@ -149,9 +148,8 @@ def call_command(
 ) -> None:
     """Call a service and print its response."""
     seconds("--timeout", timeout)
-    import rosz.message.convert  # noqa: F401  # used later; Ctrl-C must not interrupt an import
-    from rosz.introspect.arguments import read_arguments
-    from rosz.introspect.services import find_server, wait_for_server
+    from rosz.introspect import find_server, read_arguments, wait_for_server
+    from rosz.message import to_jsonable  # noqa: F401  # used later; Ctrl-C must not interrupt an import
     from rosz.node import Node
 
     arguments = read_arguments(values or ())
@@ -186,20 +184,19 @@ def _failing() -> Iterator[None]:
 
 def _requests(arguments: list[Any], request_type: Any) -> Iterable[list[Any]]:
     """Return the values of each request, from the command line or from standard input."""
-    from rosz.introspect.arguments import list_arguments, read_stream
+    from rosz.introspect import list_arguments, read_stream
 
     if arguments or not request_type.__slots__:
         return [arguments]
     if sys.stdin.isatty():
         raise UsageError(f"no values are given; they are: {list_arguments(request_type)}")
     documents = read_stream(sys.stdin.buffer, warn)
-    return (one if isinstance(one, list) else [one] for one in documents)
+    return (document if isinstance(document, list) else [document] for document in documents)
 
 
 def _send(client: Client, values: Sequence[Any], *, verbose: bool, as_json: bool) -> None:
-    from rosz.introspect.arguments import with_arguments
-    from rosz.introspect.services import call_service
-    from rosz.message.convert import to_jsonable
+    from rosz.introspect import call_service, with_arguments
+    from rosz.message import to_jsonable
 
     try:
         request, response = call_service(client, values, time.time_ns())

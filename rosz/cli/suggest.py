@@ -1,55 +1,34 @@
 """Sources of completions: names on the network, types, packages and files.
 
 Each source is a function that returns the words that may stand where a person types. A declaration
-names its source. Every source answers quickly or not at all, because a person waits after pressing
-the TAB key; and this module imports little, because every command imports it.
+names its source. What is on the network is asked for within a time limit, because a person waits
+after pressing the TAB key; what is on the disk always comes. This module imports little, because
+every command imports it.
 """
 
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from threading import Thread
 
     from rosz.environment import Environment
-    from rosz.introspect.survey import Survey
+    from rosz.introspect import Survey
     from rosz.packages import PackageIndex
     from rosz.session import Session
     from rosz.typestore import Kind, TypeStore
 
-__all__ = (
-    "Line",
-    "Source",
-    "actions",
-    "definitions",
-    "executables",
-    "files",
-    "goal_values",
-    "launch_words",
-    "machines",
-    "nodes",
-    "package_file_names",
-    "package_paths",
-    "packages",
-    "packages_and_folders",
-    "params",
-    "pub_values",
-    "request_values",
-    "rospack_commands",
-    "service_types",
-    "services",
-    "topic_type",
-    "topic_types",
-    "topics",
-)
-
+T = TypeVar("T")
 _SHARE = 0.3
 """Share of the time limit of a completion that opening a session, or a reply, may take."""
+_LEAST_SECONDS = 0.01
 _LAUNCH_FILES = ("*.launch", "*.launch.xml")
 
 
@@ -57,8 +36,6 @@ class Line:
     """A command line that a person is typing, and the system it is typed on.
 
     Args:
-        environment: The settings.
-        cwd: The working folder.
         group: The name of the command group.
         before: The positional words before the cursor.
         word: The word at the cursor; may be empty.
@@ -72,18 +49,57 @@ class Line:
         self.group = group
         self.before = before
         self.word = word
+        self._deadline = time.monotonic() + environment.completion
+        self._asking: Thread | None = None
+
+    def query(self, question: Callable[[Session], T]) -> T | None:
+        """Return what a function finds on the network; ``None`` if nobody answers in time.
+
+        It runs on a thread of its own, which is left behind when the time limit is reached.
+        """
+        from threading import Event, Thread
+
+        from rosz.errors import RoszError
+
+        answers: list[T] = []
+        answered = Event()
+
+        def run() -> None:
+            try:
+                with suppress(RoszError), self._session() as session:
+                    if session is not None:
+                        answers.append(question(session))
+                        answered.set()  # closing a session takes time as well
+            finally:
+                answered.set()
+
+        self._asking = Thread(target=run, name="rosz-complete", daemon=True)
+        self._asking.start()
+        answered.wait(self._left)
+        return answers[0] if answers else None
+
+    def is_idle(self) -> bool:
+        """Wait until nothing is asked any more, within the limit; return whether that is so."""
+        if self._asking is not None:
+            self._asking.join(self._left)
+        return self._asking is None or not self._asking.is_alive()
+
+    @property
+    def _left(self) -> float:
+        """The seconds that are left."""
+        return max(_LEAST_SECONDS, self._deadline - time.monotonic())
 
     @contextmanager
-    def session(self) -> Iterator[Session | None]:
+    def _session(self) -> Iterator[Session | None]:
         """Open a session; it is ``None`` when nobody answers at once."""
         from rosz.errors import RoszError
         from rosz.session import Session, SessionConfig, is_listening
 
-        known = self.environment
+        environment = self.environment
         session = None
-        if known.connect or known.multicast or is_listening(known.rendezvous):
+        if environment.connect or environment.multicast or is_listening(environment.rendezvous):
             with suppress(RoszError):
-                session = Session.open(SessionConfig.command(known, self.timeout))
+                session = Session.open(SessionConfig.command(environment, self.timeout))
         with session or nullcontext():
             yield session
 
@@ -99,12 +115,17 @@ class Line:
 
     def take_survey(self, *, processes: bool = False) -> Survey | None:
         """Return the survey, with the processes of the nodes if wanted."""
-        from rosz.introspect.survey import take_survey
+        from rosz.introspect import take_survey
 
-        with self.session() as session:
-            if session is None:
-                return None
-            return take_survey(session, self.environment.domain, processes=processes)
+        return self.query(
+            lambda session: take_survey(
+                session,
+                self.environment.domain,
+                processes=processes,
+                # Of each of two queries, what has come by then counts.
+                timeout=self._left * _SHARE if processes else self._left * 2 * _SHARE,
+            )
+        )
 
     @cached_property
     def topics(self) -> dict[str, list[str]]:
@@ -190,7 +211,7 @@ def request_values(line: Line) -> list[str]:
 
 def actions(line: Line) -> list[str]:
     """Return the actions."""
-    from rosz.introspect.actions import list_actions
+    from rosz.actions import list_actions
 
     survey = line.survey
     return [] if survey is None else [entry.name for entry in list_actions(survey.view)]
@@ -198,7 +219,7 @@ def actions(line: Line) -> list[str]:
 
 def goal_values(line: Line) -> list[str]:
     """Return a goal of the action before, with all defaults, as one word of YAML."""
-    from rosz.introspect.actions import find_action
+    from rosz.actions import find_action
 
     if len(line.before) != 1 or line.survey is None:
         return []
@@ -213,17 +234,15 @@ def nodes(line: Line) -> list[str]:
 def machines(line: Line) -> list[str]:
     """Return the hosts that nodes run on."""
     survey = line.take_survey(processes=True)
-    return [] if survey is None else sorted({one.host for one in survey.processes.values()})
+    return [] if survey is None else sorted({process.host for process in survey.processes.values()})
 
 
 def params(line: Line) -> list[str]:
     """Return the parameters."""
-    from rosz.params.remote import ParamClient
+    from rosz.params.replica import ParamClient
 
-    with line.session() as session:
-        if session is None:
-            return []
-        return ParamClient(session, line.environment.domain, timeout=line.timeout).names()
+    domain, timeout = line.environment.domain, line.timeout
+    return line.query(lambda session: ParamClient(session, domain, timeout=timeout).names()) or []
 
 
 def definitions(line: Line) -> list[str]:
@@ -315,12 +334,12 @@ def _paths(folder: Path, word: str) -> list[str]:
     head, slash, start = word.rpartition("/")
     place = Path(head + slash).expanduser() if slash else Path()
     try:
-        found = sorted((folder / place).iterdir())
+        entries = sorted((folder / place).iterdir())
     except OSError:
         return []
     return [
         f"{head}{slash}{path.name}{'/' if path.is_dir() else ''}"
-        for path in found
+        for path in entries
         if path.name.startswith(start) and (start or not path.name.startswith("."))
     ]
 
@@ -338,5 +357,5 @@ def _plain(value: Any) -> Any:
     if isinstance(value, bytes | bytearray) or hasattr(value, "tolist"):
         return list(value)
     if isinstance(value, list):
-        return [_plain(one) for one in value]
+        return [_plain(item) for item in value]
     return value

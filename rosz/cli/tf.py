@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli.call import Call, new_group
-from rosz.cli.console import print_json, print_json_line, print_lines, print_result, warn
+from rosz.cli.console import print_json_line, print_lines, print_result, warn
 from rosz.cli.declare import Argument, Json, Option, at_least, per_second, seconds, values_last
 from rosz.errors import TransformError
 
@@ -14,13 +15,11 @@ if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.transforms import Monitor
 
-__all__ = ("app",)
-
 app = new_group("List, print, watch and publish transforms.")
 
 _TOOL = "rosz_tf"
 _TOLD_AFTER = 2_000_000_000
-"""Nanoseconds after which it is told what the command waits for."""
+"""Nanoseconds after which a warning says why the command waits."""
 
 _Wait = Annotated[float, Option("--wait SECONDS", "How long to listen to /tf.")]
 _Target = Annotated[str, Argument("TARGET", "Frame to give coordinates in.")]
@@ -28,7 +27,6 @@ _Source = Annotated[str, Argument("SOURCE", "Frame whose pose is wanted.")]
 
 
 def _monitored(node: Node, wait: float) -> Monitor:
-    """Return a monitor that has listened for a time."""
     from rosz.transforms import Monitor
 
     monitor = Monitor(node)
@@ -40,16 +38,19 @@ def _monitored(node: Node, wait: float) -> Monitor:
 def list_command(call: Call, *, wait: _Wait = 1.0, json: Json = False) -> int:
     """List frames with their parents, and by whom and how often they are published."""
     seconds("--wait", wait)
+    from rosz.transforms import describe_other_parents
+
     with call.lasting_node(_TOOL) as node:
-        found = _monitored(node, wait).frames()
+        frames = _monitored(node, wait).frames()
         lines = (
-            f"{one.frame} in {one.parent}, "
-            + ("static" if one.static else f"{one.rate:.1f} Hz")
-            + (f", from {one.node}" if one.node else "")
-            for one in found
+            f"{frame.frame} in {frame.parent}, "
+            + ("static" if frame.static else f"{frame.rate:.1f} Hz")
+            + (f", from {frame.node}" if frame.node else "")
+            + describe_other_parents(frame)
+            for frame in frames
         )
-        print_result(lines, found, as_json=json)
-        return int(not found)
+        print_result(lines, frames, as_json=json)
+        return int(not frames)
     return 1
 
 
@@ -65,9 +66,9 @@ def tree_command(
     from rosz.transforms import tree_as_dot, tree_as_text
 
     with call.lasting_node(_TOOL) as node:
-        found = _monitored(node, wait).frames()
-        print_lines([tree_as_dot(found, wait).rstrip()] if dot else tree_as_text(found))
-        return int(not found)
+        frames = _monitored(node, wait).frames()
+        print_lines([tree_as_dot(frames, wait).rstrip()] if dot else tree_as_text(frames))
+        return int(not frames)
     return 1
 
 
@@ -104,8 +105,7 @@ def echo_command(
             limit -= _TOLD_AFTER
         if not buffer.wait(known, limit, Clock()):
             raise TransformError(buffer.why_not(target, source))
-        shown = 0
-        while True:
+        for shown in itertools.count(1):
             pose, stamp = buffer.lookup(target, source)
             if json:
                 print_json_line(
@@ -113,9 +113,8 @@ def echo_command(
                 )
             else:
                 print_lines(describe_pose(pose, stamp))
-            shown += 1
             if shown == count:
-                return 0
+                break
             time.sleep(1 / rate)
     return 0
 
@@ -135,26 +134,22 @@ def monitor_command(
 
     with call.lasting_node(_TOOL) as node:
         monitor = Monitor(node)
-        shown = 0
-        while True:
+        for shown in itertools.count(1):
             time.sleep(period)
             frames, nodes = monitor.frames(), monitor.broadcasters()
-            if json:
-                print_json({"frames": frames, "broadcasters": nodes})
-            else:
-                print_lines(_report(frames, nodes))
-            shown += 1
+            row = {"frames": frames, "broadcasters": nodes}
+            print_result(_report(frames, nodes), row, as_json=json)
             if shown == count:
-                return 0
+                break
     return 0
 
 
 def _report(frames: list[Any], nodes: list[Any]) -> list[str]:
-    def figures(one: Any) -> str:
-        return f"{one.rate:8.1f} Hz, delay {one.mean_delay:.3f} s, at most {one.max_delay:.3f} s"
+    def figures(row: Any) -> str:
+        return f"{row.rate:8.1f} Hz, delay {row.mean_delay:.3f} s, at most {row.max_delay:.3f} s"
 
-    lines = [f"{one.frame:24} {'static' if one.static else figures(one)}" for one in frames]
-    return [*lines, *(f"from {one.node or 'unknown':19} {figures(one)}" for one in nodes), "---"]
+    lines = [f"{frame.frame:24} {'static' if frame.static else figures(frame)}" for frame in frames]
+    return [*lines, *(f"from {node.node or 'unknown':19} {figures(node)}" for node in nodes), "---"]
 
 
 @app.command("publish", arrange=values_last())

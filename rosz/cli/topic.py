@@ -5,8 +5,11 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import msgspec
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
@@ -22,17 +25,12 @@ from rosz.cli.declare import Argument, Json, Option, at_least, per_second
 from rosz.errors import ClosedError, EncodeError, NotFoundError, UsageError
 
 if TYPE_CHECKING:
-    from msgspec import Struct
-
-    from rosz.introspect.echo import EchoOptions
-    from rosz.introspect.fields import Filter, Target
+    from rosz.introspect import EchoOptions, Filter, Target, Topic
     from rosz.node import Context, MessageInfo, Node
     from rosz.session import Sample
     from rosz.wire import Token
 
-__all__ = ("app",)
-
-_Stats = TypeVar("_Stats", bound="Struct | None")
+_Stats = TypeVar("_Stats", bound="msgspec.Struct | None")
 
 app = new_group("List, show, measure and publish topics.")
 
@@ -56,74 +54,86 @@ _TopicName = Annotated[str, Argument("TOPIC", source=suggest.topics)]
 _TopicOrField = Annotated[str, Argument("TOPIC_OR_FIELD", source=suggest.topics)]
 
 
+class ListOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """The options of ``rosz topic list``."""
+
+    verbose: Annotated[
+        bool, Option("-v --verbose", "Print types and numbers of publishers and subscribers.")
+    ] = False
+    publishers: Annotated[bool, Option("-p", "List only published topics.")] = False
+    subscribers: Annotated[bool, Option("-s", "List only subscribed topics.")] = False
+    types: Annotated[bool, Option("-t --types", "Print types.")] = False
+    host: Annotated[bool, Option("--host", "Group topics by host.")] = False
+    json: Json = False
+
+
 @app.command("list")
 def list_command(
     call: Call,
+    options: ListOptions,
     namespace: Annotated[str, Argument("NAMESPACE", "Lists all if omitted.", suggest.topics)] = "",
-    *,
-    verbose: Annotated[
-        bool, Option("-v --verbose", "Print types and numbers of publishers and subscribers.")
-    ] = False,
-    publishers: Annotated[bool, Option("-p", "List only published topics.")] = False,
-    subscribers: Annotated[bool, Option("-s", "List only subscribed topics.")] = False,
-    types: Annotated[bool, Option("-t --types", "Print types.")] = False,
-    host: Annotated[bool, Option("--host", "Group topics by host.")] = False,
-    json: Json = False,
 ) -> int:
     """List topics."""
-    if publishers and subscribers:
+    if options.publishers and options.subscribers:
         raise UsageError("-p and -s exclude each other: without them both are listed")
-    from rosz.introspect import topics as library
+    from rosz.introspect import by_host, in_namespace, list_topics
 
     space = call.resolve(namespace, _TOOL) if namespace else "/"
-    survey = call.survey(processes=host)
-    groups = library.by_host(survey) if host else {"": list(survey.view.tokens)}
-    found = {
+    survey = call.survey(processes=options.host)
+    groups = by_host(survey) if options.host else {"": list(survey.view.tokens)}
+    listing = {
         name: [
             topic
-            for topic in library.list_topics(tokens)
-            if library.in_namespace(topic.name, space)
-            and (topic.publishers or not publishers)
-            and (topic.subscribers or not subscribers)
+            for topic in list_topics(tokens)
+            if in_namespace(topic.name, space)
+            and (topic.publishers or not options.publishers)
+            and (topic.subscribers or not options.subscribers)
         ]
         for name, tokens in groups.items()
     }
-    if json:
-        print_json(found if host else found[""])
+    if options.json:
+        print_json(listing if options.host else listing[""])
         return int(call.incomplete)
-    for name, topics in found.items():
-        indent = "  " if host else ""
-        if host and topics:
+    for name, topics in listing.items():
+        if options.host and topics:
             print_lines([f"Host [{name}]:"])
-        if verbose:
-            text = library.format_topics(
-                topics, publishers=not subscribers, subscribers=not publishers, indent=indent
-            )
-            print_lines(text.splitlines())
-        elif types:
-            print_lines(f"{indent}{topic.name} [{topic.type_text}]" for topic in topics)
-        else:
-            print_lines(indent + topic.name for topic in topics)
+        print_lines(_format_topics(topics, options))
     return int(call.incomplete)
+
+
+def _format_topics(topics: list[Topic], options: ListOptions) -> list[str]:
+    from rosz.introspect import format_topics
+
+    indent = "  " if options.host else ""
+    if options.verbose:
+        return format_topics(
+            topics,
+            publishers=not options.subscribers,
+            subscribers=not options.publishers,
+            indent=indent,
+        ).splitlines()
+    if options.types:
+        return [f"{indent}{topic.name} [{topic.type_text}]" for topic in topics]
+    return [indent + topic.name for topic in topics]
 
 
 @app.command("info")
 def info_command(call: Call, topic: _TopicName, *, json: Json = False) -> None:
     """Print the type, the publishers and the subscribers of a topic."""
-    from rosz.introspect import topics as library
+    from rosz.introspect import entity_row, find_topic, format_topic
 
     name = call.resolve(topic, _TOOL)
     survey = call.survey(processes=True, dropped=True)
     if not json:
-        print_lines([library.format_topic(survey, name)])
+        print_lines([format_topic(survey, name)])
         return
-    entry, publishers, subscriptions = library.find_topic(survey, name)
+    entry, publishers, subscriptions = find_topic(survey, name)
     print_json(
         {
             "name": entry.name,
             "types": entry.types,
-            "publishers": [library.entity_row(survey, token) for token in publishers],
-            "subscribers": [library.entity_row(survey, token) for token in subscriptions],
+            "publishers": [entity_row(survey, token) for token in publishers],
+            "subscribers": [entity_row(survey, token) for token in subscriptions],
         }
     )
 
@@ -131,8 +141,7 @@ def info_command(call: Call, topic: _TopicName, *, json: Json = False) -> None:
 @app.command("type")
 def type_command(call: Call, topic: _TopicOrField, *, json: Json = False) -> None:
     """Print the type of a topic, or of a field of its messages."""
-    from rosz.introspect.fields import find_target
-    from rosz.introspect.subscribe import resolve_field, topic_types
+    from rosz.introspect import find_target, resolve_field, topic_types
 
     name = resolve_field(topic, lambda each: call.resolve(each, _TOOL))
     view = call.survey().view
@@ -150,65 +159,65 @@ def find_command(
     json: Json = False,
 ) -> None:
     """List the topics of a type."""
-    from rosz.introspect import topics as library
+    from rosz.introspect import list_topics, topics_of_type
 
-    found = library.topics_of_type(library.list_topics(call.survey().view.tokens), type_name)
-    print_result(found, found, as_json=json)
+    names = topics_of_type(list_topics(call.survey().view.tokens), type_name)
+    print_result(names, names, as_json=json)
+
+
+class EchoFlags(msgspec.Struct, frozen=True, kw_only=True):
+    """The options of ``rosz topic echo``."""
+
+    count: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None
+    once: Annotated[bool, Option("-1 --once", "Stop after one message.")] = False
+    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False
+    width: Annotated[int | None, Option("-w WIDTH", "Print numbers with a fixed width.")] = None
+    condition: _Condition = ""
+    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False
+    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False
+    clear: Annotated[bool, Option("-c --clear", "Clear the screen before each message.")] = False
+    offset: Annotated[bool, Option("--offset", "Print times as seconds from now.")] = False
+    raw: Annotated[bool, Option("--raw", "Print the bytes without decoding them.")] = False
+    json: Json = False
 
 
 @app.command("echo")
-def echo_command(
-    call: Call,
-    topic: _TopicOrField,
-    *,
-    count: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
-    once: Annotated[bool, Option("-1 --once", "Stop after one message.")] = False,
-    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False,
-    width: Annotated[int | None, Option("-w WIDTH", "Print numbers with a fixed width.")] = None,
-    condition: _Condition = "",
-    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False,
-    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False,
-    clear: Annotated[bool, Option("-c --clear", "Clear the screen before each message.")] = False,
-    offset: Annotated[bool, Option("--offset", "Print times as seconds from now.")] = False,
-    raw: Annotated[bool, Option("--raw", "Print the bytes without decoding them.")] = False,
-    json: Json = False,
-) -> None:
+def echo_command(call: Call, topic: _TopicOrField, flags: EchoFlags) -> None:
     """Print the messages of a topic."""
-    from rosz.introspect.echo import EchoOptions
-    from rosz.introspect.fields import Filter
+    from rosz.introspect import EchoOptions, Filter
 
-    at_least("-w", width, 2, "characters", _WIDEST)
-    at_least("-n", count, 1, "messages")
+    at_least("-w", flags.width, 2, "characters", _WIDEST)
+    at_least("-n", flags.count, 1, "messages")
     options = EchoOptions(
-        plot=plot,
-        as_json=json,
-        clear=clear,
-        width=width or 0,
-        offset=offset,
-        no_arrays=noarr,
-        no_strings=nostr,
-        condition=Filter(condition) if condition else None,
+        plot=flags.plot,
+        as_json=flags.json,
+        clear=flags.clear,
+        width=flags.width or 0,
+        offset=flags.offset,
+        no_arrays=flags.noarr,
+        no_strings=flags.nostr,
+        condition=Filter(flags.condition) if flags.condition else None,
     )
-    if raw and (plot or condition or nostr or noarr):
+    if flags.raw and (flags.plot or flags.condition or flags.nostr or flags.noarr):
         raise UsageError(
             "--raw shows bytes: -p, --filter, --nostr and --noarr need decoded messages"
         )
-    from rosz.introspect.subscribe import find_class
-    from rosz.qos import QoS
+    from rosz.introspect import find_class
 
     with call.lasting_node(_TOOL) as node:
         target, token = _wait_for(node, topic)
-        to_text = _raw_text(options) if raw else _text(node, target, token, options)
-        printer = _Printer(to_text, 1 if once else count)
-        cls = None if raw else find_class(node.context, token)
-        qos = QoS(depth=_DEPTH)
-        node.subscription(target.topic, cls, printer.receive, qos=qos, raw=raw, with_info=True)
+        to_text = _raw_text(options) if flags.raw else _text(node, target, token, options)
+        printer = _Printer(to_text, 1 if flags.once else flags.count)
+        cls = None if flags.raw else find_class(node.context, token)
+        node.subscription(
+            target.topic, cls, printer.receive, queue_size=_DEPTH, raw=flags.raw, with_info=True
+        )
         printer.wait(node.context, target.topic)
 
 
 def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
     """Wait for a topic, or a field, and return it with a token of the topic."""
-    from rosz.introspect.subscribe import resolve_field, wait_for_target
+    from rosz.introspect import resolve_field, wait_for_target
 
     return wait_for_target(node.context, resolve_field(name, node.resolve), warn)
 
@@ -216,15 +225,14 @@ def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
 def _text(
     node: Node, target: Target, token: Token, options: EchoOptions
 ) -> Callable[[Any], str | None]:
-    from rosz.introspect.echo import Echo
-    from rosz.introspect.subscribe import find_class
+    from rosz.introspect import Echo, find_class
 
     kind = target.path.type_in(find_class(node.context, token))
     return Echo(target.topic, kind, target.path, options, node.now).text
 
 
 def _raw_text(options: EchoOptions) -> Callable[[Any], str]:
-    from rosz.introspect.echo import dump_bytes
+    from rosz.introspect import dump_bytes
 
     if options.as_json:
         return lambda payload: f'{{"payload":"{payload.hex()}"}}\n'
@@ -241,7 +249,6 @@ class _Printer:
         self._error: Exception | None = None
 
     def receive(self, message: Any, info: MessageInfo) -> None:
-        """Print a message."""
         if self._ended.is_set():
             return
         try:
@@ -265,7 +272,6 @@ class _Printer:
                 self._ended.set()
 
     def wait(self, context: Context, topic: str) -> None:
-        """Wait for the last message."""
         withdraw = context.on_shutdown(lambda _: self._ended.set())
         self._ended.wait()
         withdraw()
@@ -286,8 +292,7 @@ def hz_command(
     json: Json = False,
 ) -> None:
     """Print once per second how many messages arrive per second."""
-    from rosz.introspect.fields import Filter
-    from rosz.introspect.measure import RateMeter, format_rate, format_rates
+    from rosz.introspect import Filter, RateMeter, format_rate, format_rates
 
     accepted = Filter(condition) if condition else None
     size = _window(window)
@@ -303,15 +308,14 @@ def hz_command(
         _report(
             node,
             lambda: {name: meter.stats() for name, meter in meters.items()},
-            lambda found: format_rates(found) if len(found) > 1 else format_rate(*found.values()),
+            lambda rates: format_rates(rates) if len(rates) > 1 else format_rate(*rates.values()),
             as_json=json,
         )
 
 
 def _measure(node: Node, token: Token, tick: Callable[[], None], condition: Filter | None) -> None:
     """Call a function for every message of a topic, or for those that meet a condition."""
-    from rosz.introspect.subscribe import find_class
-    from rosz.qos import QoS
+    from rosz.introspect import find_class
 
     if condition is None:
         _open_tap(node, token, lambda _: tick())
@@ -322,7 +326,7 @@ def _measure(node: Node, token: Token, tick: Callable[[], None], condition: Filt
             tick()
 
     cls = find_class(node.context, token)
-    node.subscription(token.name, cls, receive, qos=QoS(depth=_DEPTH))
+    node.subscription(token.name, cls, receive, queue_size=_DEPTH)
 
 
 @app.command("bw")
@@ -330,7 +334,7 @@ def bw_command(
     call: Call, topic: _TopicName, *, window: _Window = None, json: Json = False
 ) -> None:
     """Print once per second how many bytes arrive per second."""
-    from rosz.introspect.measure import BandwidthMeter, format_bandwidth
+    from rosz.introspect import BandwidthMeter, format_bandwidth
 
     meter = BandwidthMeter(_window(window))
     with call.lasting_node(_TOOL) as node:
@@ -341,7 +345,7 @@ def bw_command(
         _report(
             node,
             lambda: {token.name: meter.stats(time.monotonic_ns())},
-            lambda found: "".join(format_bandwidth(one) for one in found.values() if one),
+            lambda rates: "".join(format_bandwidth(rate) for rate in rates.values() if rate),
             as_json=json,
         )
 
@@ -351,8 +355,7 @@ def delay_command(
     call: Call, topic: _TopicName, *, window: _Window = None, json: Json = False
 ) -> None:
     """Print once per second the age of the messages, by the stamp in their header."""
-    from rosz.introspect.measure import DelayMeter, format_delay, read_stamp
-    from rosz.introspect.subscribe import find_class
+    from rosz.introspect import DelayMeter, find_class, format_delay, read_stamp
 
     meter = DelayMeter(_window(window))
     with call.lasting_node(_TOOL) as node:
@@ -372,7 +375,7 @@ def delay_command(
         _report(
             node,
             lambda: {token.name: meter.stats()},
-            lambda found: format_delay(found[token.name]) if meter.begun else "",
+            lambda delays: format_delay(delays[token.name]) if meter.begun else "",
             as_json=json,
         )
 
@@ -385,7 +388,7 @@ def _window(given: int | None) -> int | None:
 
 
 def _open_tap(node: Node, token: Token, callback: Callable[[Sample], None]) -> None:
-    from rosz.introspect.subscribe import subscribe_samples
+    from rosz.introspect import subscribe_samples
 
     subscribe_samples(node, token.name, token.type_name, token.type_hash, callback)
 
@@ -398,17 +401,29 @@ def _report(
     as_json: bool,
 ) -> None:
     """Print statistics by topic once per period, until the node is shut down."""
-    import msgspec
-
     while not node.is_shutdown:
         node.context.wait_for_shutdown(_PERIOD)
-        found = stats()
+        figures = stats()
         if as_json:
-            rows = {name: one for name, one in found.items() if one is not None}
+            rows = {name: figure for name, figure in figures.items() if figure is not None}
             for name, row in rows.items():
                 print_json_line({"topic": name, **msgspec.structs.asdict(row)})
-        elif text := to_text(found):
+        elif text := to_text(figures):
             print_lines([text])
+
+
+class PubOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """The options of ``rosz topic pub``."""
+
+    rate: Annotated[float | None, Option("-r --rate HZ", "Publish at this rate.")] = None
+    once: Annotated[bool, Option("-1 --once", "Publish one message and stop.")] = False
+    latch: Annotated[bool, Option("-l --latch", "Latch also with -f, -r and stdin.")] = False
+    file: Annotated[str, Option("-f --file FILE", "Read messages in YAML.", suggest.files)] = ""
+    verbose: Annotated[bool, Option("-v", "Print what is published.")] = False
+    substitute: Annotated[
+        bool, Option("-s --substitute-keywords", "Replace 'now' and 'auto' in each message.")
+    ] = False
+    use_rostime: Annotated[bool, Option("--use-rostime", "'now' and 'auto' mean ROS time.")] = False
 
 
 @app.command("pub")
@@ -416,6 +431,7 @@ def pub_command(
     call: Call,
     topic: _TopicName,
     type_name: Annotated[str, Argument("TYPE", source=suggest.topic_type)],
+    options: PubOptions,
     values: Annotated[
         list[str] | None,
         Argument(
@@ -425,60 +441,58 @@ def pub_command(
             suggest.pub_values,
         ),
     ] = None,
-    *,
-    rate: Annotated[float | None, Option("-r --rate HZ", "Publish at this rate.")] = None,
-    once: Annotated[bool, Option("-1 --once", "Publish one message and stop.")] = False,
-    latch: Annotated[bool, Option("-l --latch", "Latch also with -f, -r and stdin.")] = False,
-    file: Annotated[str, Option("-f --file FILE", "Read messages in YAML.", suggest.files)] = "",
-    verbose: Annotated[bool, Option("-v", "Print what is published.")] = False,
-    substitute: Annotated[
-        bool, Option("-s --substitute-keywords", "Replace 'now' and 'auto' in each message.")
-    ] = False,
-    use_rostime: Annotated[
-        bool, Option("--use-rostime", "'now' and 'auto' mean ROS time.")
-    ] = False,
 ) -> None:
     """Publish messages."""
-    if rate is not None and once:
+    if options.rate is not None and options.once:
         raise UsageError("-r and -1 exclude each other")
-    per_second("-r", rate)
-    if values and file:
+    per_second("-r", options.rate)
+    if values and options.file:
         raise UsageError("-f gives the messages: no values are taken beside it")
-    from pathlib import Path
-
-    from rosz.introspect.arguments import (
-        list_arguments,
-        read_arguments,
-        read_file,
-        read_stream,
-        with_arguments,
-    )
-    from rosz.introspect.publish import DEFAULT_RATE, Sender, SendOptions
-    from rosz.node import Node
+    from rosz.introspect import list_arguments, read_arguments, read_file, read_stream
 
     arguments = read_arguments(values or ())
-    documents = read_file(Path(file)) if file else None
-    with until_stopped() as ready, call.context(lasting=not once) as context:
+    documents: Iterable[Any] | None = read_file(Path(options.file)) if options.file else None
+    with until_stopped() as ready, call.context(lasting=not options.once) as context:
         cls = context.types.message(type_name)
         ready()
-        from_elsewhere = bool(file) or (not arguments and bool(cls.__slots__))
-        if from_elsewhere and not file and sys.stdin.isatty():
+        if options.file or arguments or not cls.__slots__:
+            _publish(context, topic, cls, options, arguments, documents)
+        elif sys.stdin.isatty():
             raise UsageError(f"no values are given; they are: {list_arguments(cls)}")
-        latched = rate is None or latch
-        if from_elsewhere and rate is None and not latch and not once:
-            rate = DEFAULT_RATE
-        options = SendOptions(
-            rate=rate, once=once, verbose=verbose, substitute=substitute, ros_time=use_rostime
-        )
-        with Node(_TOOL, anonymous=True, context=context) as node:
-            publisher = node.publisher(topic, cls, latch=latched, queue_size=100)
-            sender = Sender(node, publisher, options, lambda line: print_lines([line]))
-            try:
-                if not from_elsewhere:
-                    sender.send(arguments)
-                elif documents is not None:
-                    sender.send_documents(documents, only_one=len(documents) == 1)
-                else:
-                    sender.send_documents(read_stream(sys.stdin.buffer, warn))
-            except EncodeError as error:
-                raise with_arguments(error, cls) from error
+        else:
+            documents = read_stream(sys.stdin.buffer, warn)
+            _publish(context, topic, cls, options, arguments, documents)
+
+
+def _publish(
+    context: Context,
+    topic: str,
+    cls: type[Any],
+    options: PubOptions,
+    arguments: list[Any],
+    documents: Iterable[Any] | None,
+) -> None:
+    from rosz.introspect import DEFAULT_RATE, Sender, SendOptions, with_arguments
+    from rosz.node import Node
+
+    rate, latched = options.rate, options.rate is None or options.latch
+    if documents is not None and rate is None and not options.latch and not options.once:
+        rate = DEFAULT_RATE
+    how = SendOptions(
+        rate=rate,
+        once=options.once,
+        verbose=options.verbose,
+        substitute=options.substitute,
+        ros_time=options.use_rostime,
+    )
+    with Node(_TOOL, anonymous=True, context=context) as node:
+        publisher = node.publisher(topic, cls, latch=latched, queue_size=100)
+        sender = Sender(node, publisher, how, lambda line: print_lines([line]))
+        try:
+            if documents is None:
+                sender.send(arguments)
+            else:
+                only_one = isinstance(documents, list) and len(documents) == 1
+                sender.send_documents(documents, only_one=only_one)
+        except EncodeError as error:
+            raise with_arguments(error, cls) from error

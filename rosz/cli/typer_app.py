@@ -1,4 +1,4 @@
-"""Run a command line with typer, which writes help and explains what is wrong with a line."""
+"""Run a command line with typer, which writes help and explains faults of a line."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ import typer
 from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
-from rosz.cli.declare import App, Argument, Command, Option
+from rosz.cli.declare import App, Argument, Command, CommandParameter, Option
 from rosz.errors import UsageError
-
-__all__ = ("run", "translate")
 
 _NUMBERS: dict[Any, str] = {int: "integer", float: "number"}
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
 def run(app: App, argv: Sequence[str], program: str) -> Any:
-    """Run a command line, and return what its command returns.
+    """Run a command line, and return the result of its command.
 
     Raises:
         UsageError: The command line is wrong.
@@ -52,12 +50,11 @@ class _Group(TyperGroup):
     """A group that lists its commands as ROS 1's tools do, when it has the name of one of them."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the commands with their descriptions."""
         name = ctx.command_path
         if name.startswith("rosz "):
             super().format_commands(ctx, formatter)
             return
-        rows = [(f"{name} {one}", made.get_short_help_str()) for one, made in self.commands.items()]
+        rows = [(f"{name} {own}", made.get_short_help_str()) for own, made in self.commands.items()]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
 
@@ -81,7 +78,8 @@ def translate(app: App, remappings: Sequence[str]) -> typer.Typer:
         context_settings=_SETTINGS,
     )
     if app.help:
-        made.callback()(_group)  # without a callback, one command alone is not a group for typer
+        # Without a callback, one command alone is not a group for typer.
+        made.callback()(lambda: None)
     for name, command in app.commands.items():
         made.command(
             name or None,
@@ -96,33 +94,26 @@ def translate(app: App, remappings: Sequence[str]) -> typer.Typer:
     return made
 
 
-def _group() -> None: ...
-
-
 def _typed(command: Command, remappings: Sequence[str]) -> Callable[..., Any]:
-    """Return a function with typer's annotations that calls the function of a command."""
-    signature = inspect.signature(command.function, eval_str=True).parameters
-    fixed: dict[str, Any] = {}
-    kept: list[inspect.Parameter] = []
-    for one in command.parameters():
-        if one.mark is None:
-            fixed[one.name] = one.kind(remappings)
-        else:
-            given = signature[one.name]
-            hint: Any = given.annotation.__origin__
-            kept.append(given.replace(annotation=Annotated[hint, _declare(one.kind, one.mark)]))
-
     def call(**values: Any) -> Any:
-        return command.function(**values, **fixed)
+        return command.run(values, remappings)
 
-    call.__annotations__ = {one.name: one.annotation for one in kept}
-    call.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]  # for inspect
+    parameters = [_translate(parameter) for parameter in command.parameters()]
+    call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # for inspect
     return call
 
 
-def _declare(kind: Callable[[Any], Any], mark: Argument | Option) -> Any:
-    """Return the declaration of a parameter for typer."""
+def _translate(parameter: CommandParameter) -> inspect.Parameter:
+    return inspect.Parameter(
+        parameter.name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=inspect.Parameter.empty if parameter.required else parameter.default,
+        annotation=Annotated[parameter.hint, _declare(parameter.kind, parameter.mark)],
+    )
 
+
+def _declare(kind: Callable[[Any], Any], mark: Argument | Option) -> Any:
     def parse(word: Any) -> Any:
         try:
             return kind(word)

@@ -1,23 +1,23 @@
-"""``rosz msg`` and ``rosz srv``: the commands of rosmsg and rossrv."""
+"""``rosz msg`` and ``rosz srv``: the commands of rosmsg and rossrv; ``rosz gen`` writes modules."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result
 from rosz.cli.declare import App, Argument, Json, Option
+from rosz.environment import Environment, package_index
 from rosz.errors import UsageError
 from rosz.names import short_type
 
 if TYPE_CHECKING:
-    from rosz.introspect.definitions import Definitions
+    from rosz.introspect import Definitions
     from rosz.typestore import Kind
-
-__all__ = ("msg", "srv")
 
 _Single = Annotated[bool, Option("-s", "Print all on one line.")]
 _TypeName = Annotated[
@@ -49,14 +49,14 @@ class _Types:
     ) -> None:
         definitions = self._definitions(call)
         wanted = _given(name)
-        found = definitions.find(wanted)
+        names = definitions.find(wanted)
         if json:
-            print_json([definitions.summary(one) for one in found])
+            print_json([definitions.summary(full) for full in names])
             return
-        for one in found:
+        for full in names:
             if "/" not in wanted:
-                print_lines([f"[{short_type(one)}]:"])
-            print_lines([definitions.text(one) if raw else definitions.show(one)])
+                print_lines([f"[{short_type(full)}]:"])
+            print_lines([definitions.text(full) if raw else definitions.show(full)])
 
     def list(self, call: Call, *, json: Json = False) -> None:
         names = call.types.names(self._kind)
@@ -81,7 +81,7 @@ class _Types:
         print_result([" ".join(names)] if single else names, names, as_json=json)
 
     def _definitions(self, call: Call) -> Definitions:
-        from rosz.introspect.definitions import Definitions
+        from rosz.introspect import Definitions
 
         return Definitions(call.types, self._kind)
 
@@ -90,9 +90,9 @@ def _print_hashes(
     definitions: Definitions, name: str, compute: Callable[[str], str], *, as_json: bool
 ) -> None:
     wanted = _given(name)
-    hashes = {one: compute(one) for one in definitions.find(wanted)}
-    lines = (v if "/" in wanted else f"[{short_type(one)}]: {v}" for one, v in hashes.items())
-    print_result(lines, {short_type(one): v for one, v in hashes.items()}, as_json=as_json)
+    hashes = {full: compute(full) for full in definitions.find(wanted)}
+    lines = (v if "/" in wanted else f"[{short_type(full)}]: {v}" for full, v in hashes.items())
+    print_result(lines, {short_type(full): v for full, v in hashes.items()}, as_json=as_json)
 
 
 def _given(word: str, what: str = "type") -> str:
@@ -106,7 +106,6 @@ def _given(word: str, what: str = "type") -> str:
 
 
 def _new_app(kind: Kind, word: str) -> App:
-    """Return the commands that show definitions."""
     app = new_group(f"Show {word} types.")
     types = _Types(kind)
     show = f"Print a {word} type, with the fields of the types in it."
@@ -122,3 +121,39 @@ def _new_app(kind: Kind, word: str) -> App:
 
 msg = _new_app("msg", "message")
 srv = _new_app("srv", "service")
+gen = App()
+
+
+@gen.command()
+def gen_command(
+    packages: Annotated[
+        list[str] | None,
+        Argument(
+            "PACKAGE", "Names or folders; the package of this folder if omitted.", suggest.packages
+        ),
+    ] = None,
+    *,
+    output: Annotated[
+        str,
+        Option(
+            "-o --output FOLDER", "Where to write; src in the package if omitted.", suggest.files
+        ),
+    ] = "",
+    check: Annotated[
+        bool, Option("--check", "Write nothing; the exit code is 1 if a module is stale.")
+    ] = False,
+) -> int:
+    """Write Python modules for messages and services, for editors and type checkers.
+
+    Programs do not need them: a module that is not written is compiled when it is imported.
+    """
+    from rosz.workspace import Generator
+
+    folder = Path(output).absolute() if output else None
+    generator = Generator(package_index(Environment.read()), folder, Path.cwd())
+    if check:
+        wrong = generator.stale(packages or [])
+        print_lines(wrong)
+        return int(bool(wrong))
+    print_lines(map(str, generator.write(packages or [])))
+    return 0

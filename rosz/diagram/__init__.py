@@ -1,6 +1,6 @@
 """Pictures of nodes and topics, as rqt_graph draws them; pure.
 
-``picture`` chooses what is shown, ``layers`` gives it a layout, and ``drawing`` writes it as SVG,
+``picture`` chooses nodes and topics, ``layers`` gives them a layout, ``drawing`` writes it as SVG,
 DOT or Mermaid.
 """
 

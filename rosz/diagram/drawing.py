@@ -6,10 +6,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 from rosz.diagram.labels import place_labels
-from rosz.diagram.layers import Layout, Place, lay_out
+from rosz.diagram.layers import BoxPlace, PictureLayout, lay_out
 from rosz.diagram.picture import Arrow, Box, Picture
-
-__all__ = ("label_of", "labels_of", "write_dot", "write_mermaid", "write_svg")
 
 _FEW = 2
 _LETTER = 6.3
@@ -38,17 +36,12 @@ text { font: 12px system-ui, sans-serif; fill: var(--graph-text, #1c2433); text-
 
 
 def label_of(arrow: Arrow, rates: Mapping[str, str]) -> str:
-    """Return the label of an arrow: its topics if it joins nodes, and what flows.
-
-    Args:
-        arrow: The arrow.
-        rates: Rate of each topic as text.
-    """
-    known = [topic for topic in arrow.topics if topic in rates]
+    """Return the label of an arrow: its topics if it joins nodes, and their rates."""
+    measured = [topic for topic in arrow.topics if topic in rates]
     if arrow.start.startswith("topic:"):
         return ""
     if arrow.end.startswith("topic:"):
-        return rates[known[0]] if known else ""
+        return rates[measured[0]] if measured else ""
     if len(arrow.topics) > _FEW:
         return f"{len(arrow.topics)} topics"
     return ", ".join(
@@ -84,7 +77,7 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
     gap = min(_WIDEST_GAP, max(_NARROWEST_GAP, longest * _LETTER + 24))
     layout = lay_out(picture, gap)
     room = _RATE_LETTERS if rates else 0
-    places = place_labels(layout.paths, [len(one) and max(len(one), room) for one in labels])
+    places = place_labels(layout.paths, [len(text) and max(len(text), room) for text in labels])
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="nodes and topics"'
         f' viewBox="0 0 {layout.width:.0f} {layout.height:.0f}" width="{layout.width:.0f}"'
@@ -104,7 +97,7 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
     return "\n".join(parts) + "\n"
 
 
-def _box(place: Place, chosen: str) -> str:
+def _box(place: BoxPlace, chosen: str) -> str:
     box = place.box
     name, key = escape(box.name), escape(box.key, quote=True)
     kind = f"{box.kind} chosen" if box.key == chosen else box.kind
@@ -137,7 +130,7 @@ def _text(number: int, label: str, place: tuple[float, float, bool]) -> str:
 def _curve(path: Sequence[tuple[float, float]]) -> str:
     """Return a path through points that is level at each, in whole pixels.
 
-    Arrows of a large picture pass many layers: their paths are most of what a browser reads.
+    Arrows of a large picture pass many layers: their paths are most of its text.
     """
     x, y = map(round, path[0])
     drawn, level = f"M{x} {y}", x
@@ -153,9 +146,9 @@ def _curve(path: Sequence[tuple[float, float]]) -> str:
     return drawn if level == x else f"{drawn}H{x}"
 
 
-def _groups(layout: Layout) -> list[str]:
+def _groups(layout: PictureLayout) -> list[str]:
     """Return a frame around the boxes of each group, in each layer that has some."""
-    frames: dict[tuple[str, float], list[Place]] = {}
+    frames: dict[tuple[str, float], list[BoxPlace]] = {}
     for place in layout.places.values():
         if place.box.group:
             column = round(place.x + place.width / 2)

@@ -6,8 +6,6 @@ import itertools
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 
-__all__ = ("place_labels",)
-
 _LETTER = 6.0
 _AROUND = 6.0
 _ROW = 13.0
@@ -19,8 +17,8 @@ _STEPS = 32
 def _curve() -> tuple[list[float], list[float]]:
     """Return points of the curve from one level to another, whose sides are 1 long."""
     steps = [step / _STEPS for step in range(_STEPS + 1)]
-    across = [1.5 * one * (1 - one) + one**3 for one in steps]
-    return across, [one * one * (3 - 2 * one) for one in steps]
+    across = [1.5 * part * (1 - part) + part**3 for part in steps]
+    return across, [part * part * (3 - 2 * part) for part in steps]
 
 
 _ACROSS, _ALONG = _curve()
@@ -39,16 +37,16 @@ def place_labels(
         letters: Number of letters of each label; 0 for none.
     """
     taken: dict[int, list[tuple[float, float, float]]] = {}
-    found = []
+    placed = []
     for path, count in zip(paths, letters, strict=True):
         width = count * _LETTER + _AROUND
         places = list(_places(path, width))
         free = next((at for at in places if count and _is_free(at, width, taken)), None)
         x, y = free or places[0]
-        found.append((x, y, free is not None or not count))
+        placed.append((x, y, free is not None or not count))
         if free is not None:
             taken.setdefault(int(y // _ROW), []).append((x - width / 2, x + width / 2, y))
-    return found
+    return placed
 
 
 def _places(path: Sequence[tuple[float, float]], width: float) -> Iterator[tuple[float, float]]:
@@ -69,7 +67,9 @@ def _is_free(
 ) -> bool:
     x, y = at
     row = int(y // _ROW)
-    near = itertools.chain.from_iterable(taken.get(one, ()) for one in (row - 1, row, row + 1))
+    near = itertools.chain.from_iterable(
+        taken.get(near_row, ()) for near_row in (row - 1, row, row + 1)
+    )
     return not any(
         abs(y - other) < _ROW and x - width / 2 < right and left < x + width / 2
         for left, right, other in near

@@ -17,8 +17,6 @@ import msgspec
 
 from rosz.diagram.picture import Box, Picture
 
-__all__ = ("Layout", "Place", "lay_out")
-
 _LETTER = 7.2
 _NARROWEST = 56.0
 _BETWEEN_ROWS = 16.0
@@ -32,16 +30,8 @@ _MOST_BENDS = 20_000
 """Bends above which arrows go straight: a picture that no person reads anyway."""
 
 
-class Place(msgspec.Struct, frozen=True):
-    """Position and size of a box, in pixels.
-
-    Attributes:
-        box: The box.
-        x: Left side.
-        y: Upper side.
-        width: Width.
-        height: Height.
-    """
+class BoxPlace(msgspec.Struct, frozen=True):
+    """Upper left corner and size of a box, in pixels."""
 
     box: Box
     x: float
@@ -50,36 +40,20 @@ class Place(msgspec.Struct, frozen=True):
     height: float
 
 
-class Layout(msgspec.Struct, frozen=True):
-    """Positions of all boxes and arrows, in pixels.
+class PictureLayout(msgspec.Struct, frozen=True):
+    """Places of boxes by their keys, points of arrows in their order, and the size, in pixels."""
 
-    Attributes:
-        places: The place of each box, by key.
-        paths: The points of each arrow of the picture, in its order.
-        width: Width of the whole.
-        height: Height of the whole.
-    """
-
-    places: dict[str, Place]
+    places: dict[str, BoxPlace]
     paths: list[list[tuple[float, float]]]
     width: float
     height: float
 
 
-class _Graph:
-    """The vertices of a picture, by number: its boxes, and the bends of its arrows.
+class _Layers:
+    """The vertices of a picture, by number: its boxes, and then the bends of its arrows.
 
     Numbers and lists, since an arrow over many layers has a bend in each, and a large picture
-    some ten thousand.
-
-    Args:
-        picture: The picture.
-
-    Attributes:
-        boxes: The boxes, which are the first vertices.
-        layer: Layer of each vertex.
-        before: The neighbours of each vertex in the layer before its own.
-        after: Those in the layer behind it.
+    some ten thousand. ``before`` and ``after`` are the neighbours in the adjacent layers.
     """
 
     def __init__(self, picture: Picture) -> None:
@@ -97,10 +71,10 @@ class _Graph:
         self.after.append([])
         return len(self.layer) - 1
 
-    def join(self, one: int, other: int) -> None:
+    def join(self, vertex: int, other: int) -> None:
         """Make vertices of adjacent layers neighbours."""
-        self.after[one].append(other)
-        self.before[other].append(one)
+        self.after[vertex].append(other)
+        self.before[other].append(vertex)
 
     def height(self, vertex: int) -> float:
         """Return the height of a vertex."""
@@ -112,7 +86,7 @@ class _Graph:
 
 
 @lru_cache(maxsize=4)
-def lay_out(picture: Picture, gap: float = 64.0) -> Layout:
+def lay_out(picture: Picture, gap: float = 64.0) -> PictureLayout:
     """Return the layout of a picture.
 
     Args:
@@ -123,7 +97,7 @@ def lay_out(picture: Picture, gap: float = 64.0) -> Layout:
     edges = [(arrow.start, arrow.end) for arrow in picture.arrows]
     forward = _acyclic(keys, edges)
     layer_of = _layer(keys, [pair for pair in forward if pair[0] != pair[1]])
-    graph = _Graph(picture)
+    graph = _Layers(picture)
     graph.layer += [layer_of[key] for key in keys]
     chains = _chain(graph, forward)
     layers = _collect(graph, chains)
@@ -182,7 +156,7 @@ def _layer(keys: Sequence[str], edges: Iterable[tuple[str, str]]) -> dict[str, i
     return layer
 
 
-def _chain(graph: _Graph, edges: Sequence[tuple[str, str]]) -> list[list[int]]:
+def _chain(graph: _Layers, edges: Sequence[tuple[str, str]]) -> list[list[int]]:
     """Join the boxes of each edge, by a bend in each layer between them."""
     number = {box.key: number for number, box in enumerate(graph.boxes)}
     ends = [(number[start], number[end]) for start, end in edges]
@@ -193,30 +167,30 @@ def _chain(graph: _Graph, edges: Sequence[tuple[str, str]]) -> list[list[int]]:
         between = range(graph.layer[first] + 1, graph.layer[last]) if bends else ()
         chain = [first, *map(graph.add_bend, between), last]
         if first != last:
-            for one, other in itertools.pairwise(chain):
-                graph.join(one, other)
+            for vertex, other in itertools.pairwise(chain):
+                graph.join(vertex, other)
         chains.append(chain)
     return chains
 
 
-def _collect(graph: _Graph, chains: Iterable[list[int]]) -> list[list[int]]:
+def _collect(graph: _Layers, chains: Iterable[list[int]]) -> list[list[int]]:
     """Return the vertices of each layer, in groups, and beside each other by first sight."""
     layers: list[list[int]] = [[] for _ in range(max(graph.layer, default=-1) + 1)]
-    for one in sorted(range(len(graph.boxes)), key=lambda one: graph.boxes[one].group):
-        layers[graph.layer[one]].append(one)
+    for vertex in sorted(range(len(graph.boxes)), key=lambda vertex: graph.boxes[vertex].group):
+        layers[graph.layer[vertex]].append(vertex)
     for chain in chains:
         for bend in chain[1:-1]:
             layers[graph.layer[bend]].append(bend)
     return layers
 
 
-def _order(graph: _Graph, layers: list[list[int]]) -> None:
+def _order(graph: _Layers, layers: list[list[int]]) -> None:
     """Order each layer by the mean order of its neighbours, there and back."""
     order = [0] * len(graph.layer)
     for layer in layers:
         _number(layer, order)
-    before = [near or [one] for one, near in enumerate(graph.before)]
-    after = [near or [one] for one, near in enumerate(graph.after)]
+    before = [near or [vertex] for vertex, near in enumerate(graph.before)]
+    after = [near or [vertex] for vertex, near in enumerate(graph.after)]
     best, fewest = [list(layer) for layer in layers], _crossings(graph, layers, order)
     for sweep in range(_ORDER_SWEEPS):
         if not fewest:
@@ -226,15 +200,15 @@ def _order(graph: _Graph, layers: list[list[int]]) -> None:
             wanted = _means(layer, before if forth else after, order)
             layer[:] = [layer[at] for at in sorted(range(len(layer)), key=wanted.__getitem__)]
             _number(layer, order)
-        found = _crossings(graph, layers, order)
-        if found < fewest:
-            best, fewest = [list(layer) for layer in layers], found
+        crossings = _crossings(graph, layers, order)
+        if crossings < fewest:
+            best, fewest = [list(layer) for layer in layers], crossings
     layers[:] = best
 
 
 def _number(layer: Iterable[int], order: list[int]) -> None:
-    for number, one in enumerate(layer):
-        order[one] = number
+    for number, vertex in enumerate(layer):
+        order[vertex] = number
 
 
 def _means(
@@ -247,8 +221,7 @@ def _means(
     ]
 
 
-def _crossings(graph: _Graph, layers: Iterable[list[int]], order: Sequence[int]) -> int:
-    """Return how often edges cross."""
+def _crossings(graph: _Layers, layers: Iterable[list[int]], order: Sequence[int]) -> int:
     total = 0
     for layer in layers:
         ends: list[int] = []
@@ -275,46 +248,42 @@ def _inversions(values: Iterable[int]) -> int:
     return total
 
 
-def _place(graph: _Graph, layers: Sequence[list[int]]) -> list[float]:
-    """Move the vertices of each layer towards their neighbours, without changing its order.
-
-    Returns:
-        The middle of each vertex, from top to bottom.
-    """
+def _place(graph: _Layers, layers: Sequence[list[int]]) -> list[float]:
+    """Return the middles of vertices, moved towards their neighbours in the order of layers."""
     middles = [0.0] * len(graph.layer)
     offsets = []
     for layer in layers:
         y = 0.0
-        for one in layer:
-            middles[one] = y + graph.height(one) / 2
-            y += graph.height(one) + graph.gap(one)
+        for vertex in layer:
+            middles[vertex] = y + graph.height(vertex) / 2
+            y += graph.height(vertex) + graph.gap(vertex)
         offsets.append(_offsets(graph, layer))
     near = list(zip(graph.before, graph.after, strict=True))
-    before = [before or after or [one] for one, (before, after) in enumerate(near)]
-    after = [after or before or [one] for one, (before, after) in enumerate(near)]
+    before = [before or after or [vertex] for vertex, (before, after) in enumerate(near)]
+    after = [after or before or [vertex] for vertex, (before, after) in enumerate(near)]
     rows = list(zip(layers, offsets, strict=True))
     for sweep in range(_PLACE_SWEEPS):
         forth = sweep % 2 == 0
         for layer, distances in rows if forth else reversed(rows):
             wanted = _means(layer, before if forth else after, middles)
-            for one, middle in zip(layer, _spread(wanted, distances), strict=True):
-                middles[one] = middle
+            for vertex, middle in zip(layer, _spread(wanted, distances), strict=True):
+                middles[vertex] = middle
     return middles
 
 
-def _offsets(graph: _Graph, layer: Sequence[int]) -> list[float]:
+def _offsets(graph: _Layers, layer: Sequence[int]) -> list[float]:
     """Return how far each vertex of a layer is at least below the first one."""
     offsets = [0.0] * bool(layer)
-    for before, one in itertools.pairwise(layer):
-        apart = (graph.height(before) + graph.height(one)) / 2
-        offsets.append(offsets[-1] + apart + max(graph.gap(before), graph.gap(one)))
+    for before, vertex in itertools.pairwise(layer):
+        apart = (graph.height(before) + graph.height(vertex)) / 2
+        offsets.append(offsets[-1] + apart + max(graph.gap(before), graph.gap(vertex)))
     return offsets
 
 
 def _spread(wanted: Sequence[float], offsets: Sequence[float]) -> Iterator[float]:
     """Give each vertex the nearest free place to where it is wanted, by least squares.
 
-    Vertices that would overlap form a block, whose place is the mean of what its members want.
+    Vertices that would overlap form a block; its place is the mean of those that its members want.
     """
     totals: list[float] = []
     counts: list[int] = []
@@ -336,53 +305,49 @@ def _spread(wanted: Sequence[float], offsets: Sequence[float]) -> Iterator[float
 
 def _measure(
     picture: Picture,
-    graph: _Graph,
+    graph: _Layers,
     chains: Sequence[list[int]],
     layers: Sequence[list[int]],
     middles: Sequence[float],
     gap: float,
-) -> Layout:
+) -> PictureLayout:
     """Return places and paths in numbers that begin at a margin."""
     heights = [*map(graph.height, range(len(middles)))]
     top = min((y - height / 2 for y, height in zip(middles, heights, strict=True)), default=0.0)
     bottom = max((y + height / 2 for y, height in zip(middles, heights, strict=True)), default=0.0)
     lefts, widths, x = [], [], _MARGIN
     for layer in layers:
-        boxes = (one for one in layer if one < len(graph.boxes))
-        width = max((graph.widths[one] for one in boxes), default=0.0)
+        boxes = (vertex for vertex in layer if vertex < len(graph.boxes))
+        width = max((graph.widths[vertex] for vertex in boxes), default=0.0)
         lefts.append(x)
         widths.append(width)
         x += width + gap
     shift = _MARGIN - top
-    places: dict[str, Place] = {}
-    for one, box in enumerate(graph.boxes):
-        at, width, height = graph.layer[one], graph.widths[one], graph.heights[one]
+    places: dict[str, BoxPlace] = {}
+    for vertex, box in enumerate(graph.boxes):
+        at, width, height = graph.layer[vertex], graph.widths[vertex], graph.heights[vertex]
         left = lefts[at] + (widths[at] - width) / 2
-        places[box.key] = Place(box, left, middles[one] - height / 2 + shift, width, height)
+        places[box.key] = BoxPlace(box, left, middles[vertex] - height / 2 + shift, width, height)
     columns = [(left, left + width) for left, width in zip(lefts, widths, strict=True)]
     paths = []
     for chain, arrow in zip(chains, picture.arrows, strict=True):
-        first, last = (places[graph.boxes[one].key] for one in (chain[0], chain[-1]))
+        first, last = (places[graph.boxes[vertex].key] for vertex in (chain[0], chain[-1]))
         turned = first.box.key != arrow.start
         # An arrow back is a little lower than one there, which may have the same ends.
         lower = shift + _TURNED_SHIFT * turned
-        bends = [(*columns[graph.layer[one]], middles[one] + lower) for one in chain[1:-1]]
+        bends = [(*columns[graph.layer[vertex]], middles[vertex] + lower) for vertex in chain[1:-1]]
         path = _path(first, last, bends, _TURNED_SHIFT * turned)
         paths.append(path[::-1] if turned else path)
     width = max(x - gap + _MARGIN, 2 * _MARGIN)
-    return Layout(places, paths, width, bottom - top + 2 * _MARGIN)
+    return PictureLayout(places, paths, width, bottom - top + 2 * _MARGIN)
 
 
 def _path(
-    first: Place, last: Place, bends: Iterable[tuple[float, float, float]], lower: float
+    first: BoxPlace, last: BoxPlace, bends: Iterable[tuple[float, float, float]], lower: float
 ) -> list[tuple[float, float]]:
     """Return the points of an arrow, which is level in the layers that it passes.
 
-    Args:
-        first: The box that it leaves.
-        last: The box that it reaches.
-        bends: Left and right side of each layer between them, and where it passes.
-        lower: How far below the middle of the boxes it begins and ends.
+    A bend is the left and the right side of a layer, and the height at which the arrow passes.
     """
     if first is last:  # a loop above the box
         right, up = first.x + first.width / 2, first.y

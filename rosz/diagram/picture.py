@@ -18,8 +18,6 @@ from rosz.errors import UsageError
 from rosz.names import is_of_action, namespace, short_type
 from rosz.wire import Kind, Token
 
-__all__ = ("CONTENTS", "Arrow", "Box", "Content", "Picture", "PictureOptions", "make_picture")
-
 Content: TypeAlias = Literal["nodes", "active", "all"]
 CONTENTS: tuple[Content, ...] = ("nodes", "active", "all")
 """Nodes only; nodes and topics that connect some; nodes and all topics."""
@@ -121,13 +119,32 @@ def make_picture(tokens: Iterable[Token], options: PictureOptions) -> Picture:
 
     Args:
         tokens: Live tokens.
-        options: What to show.
+        options: Choice of nodes and topics.
 
     Raises:
         UsageError: An option is not valid.
     """
     if options.content not in CONTENTS:
         raise UsageError(f"'{options.content}' is not shown; expected {', '.join(CONTENTS)}")
+    nodes, topics = _collect(tokens, options)
+    arrows = (_node_arrows if options.content == "nodes" else _topic_arrows)(topics, nodes)
+    boxes = [Box(f"node:{name}", name, "node", group=_group(name, options.group)) for name in nodes]
+    ends = {end for arrow in arrows for end in (arrow.start, arrow.end)}
+    if options.hide_unconnected:
+        boxes = [box for box in boxes if box.key in ends]
+    for name, topic in topics.items():
+        if f"topic:{name}" in ends:
+            types, group = ", ".join(sorted(topic.types)), _group(name, options.group)
+            boxes.append(Box(f"topic:{name}", name, "topic", types, group))
+    return Picture(
+        tuple(sorted(boxes, key=lambda box: box.key)),
+        tuple(sorted(arrows, key=lambda arrow: (arrow.start, arrow.end))),
+    )
+
+
+def _collect(
+    tokens: Iterable[Token], options: PictureOptions
+) -> tuple[set[str], dict[str, _Topic]]:
     shows_node, shows_topic = _Chooser(options.nodes), _Chooser(options.topics)
     nodes: set[str] = set()
     topics: dict[str, _Topic] = {}
@@ -142,23 +159,11 @@ def make_picture(tokens: Iterable[Token], options: PictureOptions) -> Picture:
             topic.types.add(short_type(token.type_name))
             ends = topic.publishers if token.kind is Kind.PUBLISHER else topic.subscribers
             ends.add(name)
-    shown = {
+    return nodes, {
         name: topic
         for name, topic in topics.items()
         if shows_topic(name) and _is_shown(name, topic, options)
     }
-    arrows = (_node_arrows if options.content == "nodes" else _topic_arrows)(shown, nodes)
-    boxes = [_node_box(name, options) for name in nodes]
-    if options.content != "nodes":
-        boxes += [_topic_box(name, topic, options) for name, topic in shown.items()]
-    ends = {end for arrow in arrows for end in (arrow.start, arrow.end)}
-    if options.hide_unconnected:
-        boxes = [box for box in boxes if box.key in ends]
-    boxes = [box for box in boxes if box.kind == "node" or box.key in ends]
-    return Picture(
-        tuple(sorted(boxes, key=lambda box: box.key)),
-        tuple(sorted(arrows, key=lambda arrow: (arrow.start, arrow.end))),
-    )
 
 
 def _is_shown(name: str, topic: _Topic, options: PictureOptions) -> bool:
@@ -174,34 +179,24 @@ def _is_shown(name: str, topic: _Topic, options: PictureOptions) -> bool:
 
 
 def _node_arrows(topics: dict[str, _Topic], nodes: set[str]) -> list[Arrow]:
-    found: dict[tuple[str, str], list[str]] = {}
+    topics_of: dict[tuple[str, str], list[str]] = {}
     for name, topic in sorted(topics.items()):
         for start in topic.publishers & nodes:
             for end in topic.subscribers & nodes:
-                found.setdefault((start, end), []).append(name)
+                topics_of.setdefault((start, end), []).append(name)
     return [
-        Arrow(f"node:{start}", f"node:{end}", tuple(names)) for (start, end), names in found.items()
+        Arrow(f"node:{start}", f"node:{end}", tuple(names))
+        for (start, end), names in topics_of.items()
     ]
 
 
 def _topic_arrows(topics: dict[str, _Topic], nodes: set[str]) -> list[Arrow]:
-    return [
-        arrow
-        for name, topic in topics.items()
-        for arrow in (
-            *(Arrow(f"node:{one}", f"topic:{name}", (name,)) for one in topic.publishers & nodes),
-            *(Arrow(f"topic:{name}", f"node:{one}", (name,)) for one in topic.subscribers & nodes),
-        )
-    ]
-
-
-def _node_box(name: str, options: PictureOptions) -> Box:
-    return Box(f"node:{name}", name, "node", group=_group(name, options.group))
-
-
-def _topic_box(name: str, topic: _Topic, options: PictureOptions) -> Box:
-    types = ", ".join(sorted(topic.types))
-    return Box(f"topic:{name}", name, "topic", types, _group(name, options.group))
+    arrows: list[Arrow] = []
+    for name, topic in topics.items():
+        key = f"topic:{name}"
+        arrows += [Arrow(f"node:{node}", key, (name,)) for node in topic.publishers & nodes]
+        arrows += [Arrow(key, f"node:{node}", (name,)) for node in topic.subscribers & nodes]
+    return arrows
 
 
 def _group(name: str, depth: int) -> str:
@@ -218,9 +213,9 @@ class _Chooser:
         self._unwanted = [_pattern(word[1:]) for word in words if word.startswith("-")]
 
     def __call__(self, name: str) -> bool:
-        if any(one.fullmatch(name) for one in self._unwanted):
+        if any(pattern.fullmatch(name) for pattern in self._unwanted):
             return False
-        return not self._wanted or any(one.fullmatch(name) for one in self._wanted)
+        return not self._wanted or any(pattern.fullmatch(name) for pattern in self._wanted)
 
 
 def _pattern(word: str) -> re.Pattern[str]:

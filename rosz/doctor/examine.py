@@ -7,46 +7,14 @@ from pathlib import Path
 
 import msgspec
 
-from rosz.doctor.finding import Finding, warning
-from rosz.doctor.machine import (
-    LEAST_FREE,
-    check_connect,
-    check_rendezvous,
-    check_segments,
-    check_shared_memory,
-    check_socket_files,
-    check_stopped,
-)
-from rosz.doctor.replies import (
-    check_clocks,
-    check_replicas,
-    check_silent,
-    check_stamps,
-    check_versions,
-    check_visibility,
-    check_waiting,
-    query_nodes,
-)
-from rosz.doctor.tokens import (
-    check_clock,
-    check_domains,
-    check_duplicates,
-    check_hashes,
-    check_hashless,
-    check_one_sided,
-    check_packages,
-    check_types,
-    check_unreadable,
-)
+from rosz.doctor import frames, machine, replies, tokens
+from rosz.doctor.machine import Finding, warning
 from rosz.environment import Environment, package_index
 from rosz.errors import TransportError
-from rosz.introspect.connect import open_session
-from rosz.introspect.survey import take_survey
+from rosz.introspect import open_session, take_survey
 from rosz.session import SEGMENTS, Session
 from rosz.typestore import TypeStore
 from rosz.wire import Kind
-
-__all__ = ("Examination", "examine")
 
 
 class Examination(msgspec.Struct, kw_only=True):
@@ -54,7 +22,7 @@ class Examination(msgspec.Struct, kw_only=True):
 
     Attributes:
         environment: Settings of this machine.
-        listen: Time limit for samples of ROS 2 nodes, in seconds.
+        listen: Time limit for samples of ROS 2 nodes, and time for transforms, in seconds.
         memory: Folder of shared memory.
         least_free: Number of bytes of it that must be free.
         nodes: Number of nodes found.
@@ -63,22 +31,24 @@ class Examination(msgspec.Struct, kw_only=True):
     environment: Environment
     listen: float = 1.0
     memory: Path = SEGMENTS
-    least_free: int = LEAST_FREE
+    least_free: int = machine.LEAST_FREE
     nodes: int = 0
 
 
 def examine(examination: Examination) -> Iterator[Finding]:
     """Yield findings as the checks find them."""
     environment = examination.environment
-    yield from check_shared_memory(examination.memory, examination.least_free)
-    yield from check_segments(examination.memory)
-    yield from check_socket_files(environment)
-    yield from check_connect(environment)
-    stopped = list(check_stopped(environment))
+    yield from machine.check_shared_memory(examination.memory, examination.least_free)
+    yield from machine.check_segments(examination.memory)
+    yield from machine.check_socket_files(environment)
+    yield from machine.check_package_path(environment)
+    yield from machine.check_namespace(environment)
+    yield from machine.check_connect(environment)
+    stopped = list(machine.check_stopped(environment))
     yield from stopped
-    held = [] if stopped else list(check_rendezvous(environment))
-    yield from held
-    if held:
+    taken = [] if stopped else list(machine.check_rendezvous(environment))
+    yield from taken
+    if taken:
         return
     try:
         session = open_session(environment)
@@ -98,23 +68,25 @@ def _examine_network(session: Session, examination: Examination) -> Iterator[Fin
     environment = examination.environment
     survey = take_survey(session, environment.domain, processes=True)
     examination.nodes = len(survey.view.nodes())
-    yield from check_waiting(session)
-    yield from check_domains(session, survey)
-    yield from check_versions(session)
-    yield from check_unreadable(survey)
-    yield from check_duplicates(survey)
-    yield from check_hashless(survey, environment.distro)
-    yield from check_types(survey)
-    yield from check_hashes(survey)
-    yield from check_packages(survey, _type_hashes(environment), environment.distro)
-    yield from check_clock(survey)
-    yield from check_one_sided(survey)
-    replies = query_nodes(session, environment.domain) if survey.processes else {}
-    yield from check_silent(session, survey, replies)
-    yield from check_visibility(session, survey, replies)
-    yield from check_clocks(survey, replies)
-    yield from check_replicas(session, environment.domain)
-    yield from check_stamps(session, survey, examination.listen)
+    yield from replies.check_waiting(session)
+    yield from tokens.check_domains(session, survey)
+    yield from replies.check_versions(session)
+    yield from tokens.check_unreadable(survey)
+    yield from tokens.check_names(survey)
+    yield from tokens.check_duplicates(survey)
+    yield from tokens.check_hashless(survey, environment.distro)
+    yield from tokens.check_types(survey)
+    yield from tokens.check_hashes(survey)
+    yield from tokens.check_packages(survey, _type_hashes(environment), environment.distro)
+    yield from tokens.check_clock(survey)
+    yield from tokens.check_one_sided(survey)
+    answers = replies.query_nodes(session, environment.domain) if survey.processes else {}
+    yield from replies.check_silent(session, survey, answers)
+    yield from replies.check_visibility(session, survey, answers)
+    yield from replies.check_clocks(survey, answers)
+    yield from replies.check_replicas(session, environment.domain)
+    yield from replies.check_stamps(session, survey, examination.listen)
+    yield from frames.check_frames(session, survey, examination.listen)
 
 
 def _type_hashes(environment: Environment) -> Callable[[Kind, str], str]:

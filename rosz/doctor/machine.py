@@ -1,4 +1,4 @@
-"""Checks on this machine: shared memory, stopped processes, endpoints."""
+"""The finding of a check, and the checks of shared memory, processes and endpoints."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ import os
 import socket
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Literal
 
-from rosz.doctor.finding import Finding, error, warning
+import msgspec
+
+from rosz import names
 from rosz.environment import Environment
-from rosz.errors import TransportError
+from rosz.errors import InvalidName, TransportError
 from rosz.session import (
     SEGMENTS,
     LocalPeers,
@@ -26,16 +29,9 @@ from rosz.session import (
 )
 from rosz.wire import Endpoint, ProcessToken
 
-__all__ = (
-    "LEAST_FREE",
-    "check_connect",
-    "check_rendezvous",
-    "check_segments",
-    "check_shared_memory",
-    "check_socket_files",
-    "check_stopped",
-    "stopped_note",
-)
+Level = Literal["error", "warning"]
+_SHOWN = 8
+"""Number of lines of evidence that are shown to people."""
 
 LEAST_FREE = 8 << 20
 """Bytes of shared memory that a few images need."""
@@ -45,18 +41,47 @@ _LOCK_SECONDS = 2.0
 """Seconds in which the process that creates a segment locks it."""
 
 
-def check_shared_memory(folder: Path = SEGMENTS, least: int = LEAST_FREE) -> Iterator[Finding]:
-    """Find shared memory that is full.
+class Finding(msgspec.Struct, frozen=True):
+    """A fault, or something that may be one.
 
-    Args:
-        folder: Folder of shared memory.
-        least: Number of bytes that must be free.
+    Attributes:
+        name: Short stable name for programs, such as ``clock-offset``.
+        level: ``error`` for a fault; ``warning`` for something that may be intended.
+        text: Description in one line.
+        evidence: Lines of evidence.
+        remedy: Advice about it.
     """
+
+    name: str
+    level: Level
+    text: str
+    evidence: tuple[str, ...]
+    remedy: str
+
+
+def error(name: str, text: str, evidence: Iterable[str], remedy: str) -> Finding:
+    """Return a finding about a fault."""
+    return Finding(name, "error", text, tuple(evidence), remedy)
+
+
+def warning(name: str, text: str, evidence: Iterable[str], remedy: str) -> Finding:
+    """Return a finding about something that may be intended."""
+    return Finding(name, "warning", text, tuple(evidence), remedy)
+
+
+def listed(lines: tuple[str, ...]) -> tuple[str, ...]:
+    """Return lines of evidence for people, with the number of those left out."""
+    more = len(lines) - _SHOWN
+    return (*lines[:_SHOWN], f"and {more} more") if more > 1 else lines
+
+
+def check_shared_memory(folder: Path = SEGMENTS, least: int = LEAST_FREE) -> Iterator[Finding]:
+    """Find shared memory in which fewer bytes are free than the least."""
     try:
-        found = os.statvfs(folder)
+        disk = os.statvfs(folder)
     except OSError:
         return  # not Linux: shared memory is elsewhere
-    free, size = found.f_bavail * found.f_frsize, found.f_blocks * found.f_frsize
+    free, size = disk.f_bavail * disk.f_frsize, disk.f_blocks * disk.f_frsize
     if free < least:
         yield error(
             "shared-memory-full",
@@ -68,12 +93,7 @@ def check_shared_memory(folder: Path = SEGMENTS, least: int = LEAST_FREE) -> Ite
 
 
 def check_segments(folder: Path = SEGMENTS, born: float = _LOCK_SECONDS) -> Iterator[Finding]:
-    """Find segments of Zenoh that no process holds any more.
-
-    Args:
-        folder: Folder of shared memory.
-        born: Age in seconds below which a segment may still be in the making.
-    """
+    """Find segments of Zenoh that no process holds, and that are not in the making."""
     left: list[str] = []
     with suppress(OSError):
         for path in sorted(folder.glob("*.zenoh")):
@@ -109,19 +129,48 @@ def _largest(folder: Path) -> list[str]:
     return [f"{folder / name}: {size / _MIB:.1f} MiB" for size, name in sorted(sizes)[:-4:-1]]
 
 
+def check_package_path(environment: Environment) -> Iterator[Finding]:
+    """Find folders on the package path that do not exist."""
+    missing = [root for root in environment.package_roots if not root.is_dir()]
+    if missing:
+        yield warning(
+            "missing-path",
+            "ROSZ_PACKAGE_PATH or ROS_PACKAGE_PATH names what is not a folder: its packages are"
+            " not found",
+            [
+                f"{root}: {'it is a file' if root.exists() else 'it does not exist'}"
+                for root in missing
+            ],
+            "correct the variable where the shell sets it (~/.bashrc, setup.bash)",
+        )
+
+
+def check_namespace(environment: Environment) -> Iterator[Finding]:
+    """Find a ``ROS_NAMESPACE`` with which no node starts."""
+    try:
+        names.check(environment.namespace)
+    except InvalidName as fault:
+        yield error(
+            "refused-name",
+            f"no node starts here, as ROS_NAMESPACE is '{environment.namespace}'",
+            [str(fault)],
+            "set ROS_NAMESPACE to a name such as /robot1, or unset it",
+        )
+
+
 def check_stopped(environment: Environment) -> Iterator[Finding]:
     """Find processes of this machine that are stopped, as by Ctrl-Z."""
     peers = LocalPeers.read(environment.rendezvous)
     stopped = sorted({peer.pid for peer in peers.stopped})
     if not stopped:
         return
-    held = f", which holds the meeting point {environment.rendezvous}"
+    note = f", which holds the meeting point {environment.rendezvous}"
     ids = " ".join(map(str, stopped))
     yield error(
         "stopped-process",
         "stopped processes (Ctrl-Z) receive nothing and do not answer",
         (
-            f"{describe_process(pid)}{held if pid == peers.stopped_holder else ''}"
+            f"{describe_process(pid)}{note if pid == peers.stopped_holder else ''}"
             for pid in stopped
         ),
         f"let it go on with 'fg' in its terminal or 'kill -CONT {ids}', or end it with"

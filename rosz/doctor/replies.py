@@ -1,4 +1,4 @@
-"""Checks on what nodes, parameter replicas and routers reply, and on the stamps of samples.
+"""Checks on replies of nodes, parameter replicas and routers, and on the stamps of samples.
 
 The stamps tell the clock, and the release, of nodes that do not take requests.
 """
@@ -17,15 +17,14 @@ from functools import partial
 
 import msgspec
 
-from rosz.doctor.finding import Finding, error, warning
-from rosz.doctor.machine import stopped_note
+from rosz.doctor.machine import Finding, error, stopped_note, warning
 from rosz.errors import DecodeError
-from rosz.introspect.survey import Survey, process_address, take_survey
+from rosz.introspect import Survey, process_address, take_survey
 from rosz.node import NodeInfo, Request, control_key
 from rosz.params.wire import (
     BUCKETS,
     Keys,
-    Member,
+    ReplicaMember,
     SyncReply,
     SyncRequest,
     decode,
@@ -34,17 +33,6 @@ from rosz.params.wire import (
 )
 from rosz.session import Sample, Session, find_waiting, why_refused
 from rosz.wire import Kind, Token, entity_key, read_attachment
-
-__all__ = (
-    "check_clocks",
-    "check_replicas",
-    "check_silent",
-    "check_stamps",
-    "check_versions",
-    "check_visibility",
-    "check_waiting",
-    "query_nodes",
-)
 
 _NODE_TIMEOUT = 1.5
 _AGAIN = 0.4
@@ -60,12 +48,9 @@ _Pairs = set[tuple[str, str]]
 
 
 class _NodeReply(msgspec.Struct, frozen=True):
-    """The reply of a node.
+    """The reply of a node, and the offset of its clock in nanoseconds.
 
-    Attributes:
-        info: Information about the node.
-        offset: Offset of its clock from the one here, in nanoseconds.
-        doubt: Possible error of the offset, half the time that the reply took, in nanoseconds.
+    The possible error of the offset is half the time that the reply took.
     """
 
     info: NodeInfo
@@ -108,7 +93,7 @@ def check_silent(
     if barred:
         yield warning(
             "silent-machine",
-            f"{len(barred)} nodes are listed, and none of their machines answers",
+            f"{_listed(barred)}, but nothing on those machines answers",
             sorted(_name(survey, node) for node in barred),
             "nothing, if the rules there are not to let this machine control nodes (control: in"
             " rules.yaml); else they hang, or the link to their machine is broken",
@@ -116,11 +101,15 @@ def check_silent(
     if silent:
         yield error(
             "unreachable-node",
-            f"{len(silent)} nodes are listed and do not answer",
+            f"{_listed(silent)} without an answer",
             sorted(_name(survey, node) + stopped_note(survey.processes[node]) for node in silent),
             "they hang, are stopped (Ctrl-Z: 'fg' lets them go on), or the link to their machine"
             " is broken: check it with ping, and end them with 'rosz node kill'",
         )
+
+
+def _listed(nodes: set[_Node]) -> str:
+    return "1 node is listed" if len(nodes) == 1 else f"{len(nodes)} nodes are listed"
 
 
 def _barred(
@@ -129,9 +118,9 @@ def _barred(
     """Return the nodes that access rules may keep from replying: all those of a machine."""
     if not session.secured:
         return set()
-    known = {node: process.host for node, process in survey.processes.items()}
-    speak = {known.get(node, "") for node in replies} | {socket.gethostname()}
-    return {node for node in silent if node in known and known[node] not in speak}
+    hosts = {node: process.host for node, process in survey.processes.items()}
+    speak = {hosts.get(node, "") for node in replies} | {socket.gethostname()}
+    return {node for node in silent if node in hosts and hosts[node] not in speak}
 
 
 def check_visibility(
@@ -177,11 +166,11 @@ def _blind(survey: Survey, replies: dict[_Node, _NodeReply], stopped: set[str]) 
 
 def check_waiting(session: Session) -> Iterator[Finding]:
     """Find endpoints that cores and nodes connect to and do not reach."""
-    for one in find_waiting(session, _NODE_TIMEOUT, everywhere=True):
-        reason = why_refused(one.endpoint) if one.host == socket.gethostname() else ""
+    for dialler in find_waiting(session, _NODE_TIMEOUT, everywhere=True):
+        reason = why_refused(dialler.endpoint) if dialler.host == socket.gethostname() else ""
         yield warning(
             "waiting-for",
-            f"{one.host} is waiting for {one.endpoint}",
+            f"{dialler.host} is waiting for {dialler.endpoint}",
             [reason or "there is no link yet"],
             "start 'rosz core --listen tcp/0.0.0.0:7447' there, or check the name, the port and the"
             " firewalls between; it is connected to as soon as it is up",
@@ -222,11 +211,11 @@ def _name(survey: Survey, node: _Node) -> str:
 
 def _names(survey: Survey, zid: str) -> str:
     """Return a description of a session by its nodes."""
-    mine = sorted((p for p in survey.processes.values() if p.zid == zid), key=lambda p: p.node)
-    if not mine:
+    nodes = sorted((p for p in survey.processes.values() if p.zid == zid), key=lambda p: p.node)
+    if not nodes:
         return f"session {zid}"
-    more = f" and {len(mine) - 1} more" if len(mine) > 1 else ""
-    return f"{mine[0].node}{more} ({process_address(mine[0])})"
+    more = f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""
+    return f"{nodes[0].node}{more} ({process_address(nodes[0])})"
 
 
 _AHEAD = 0.1
@@ -239,12 +228,7 @@ _SECOND = 1_000_000_000
 
 
 class _First(msgspec.Struct):
-    """The first sample of a topic.
-
-    Attributes:
-        age: Nanoseconds between its stamp and its arrival.
-        damage: Reason why its attachment cannot be read.
-    """
+    """The age of a topic's first sample in nanoseconds, or why its stamp cannot be read."""
 
     age: int = 0
     damage: str = ""
@@ -258,8 +242,8 @@ def check_stamps(session: Session, survey: Survey, seconds: float) -> Iterator[F
         survey: The nodes that are running.
         seconds: Time limit for the first sample of each topic, in seconds.
     """
-    mine = {zid for zid, _ in survey.processes}
-    foreign = [token for token in survey.view.entities(Kind.PUBLISHER) if token.zid not in mine]
+    own = {zid for zid, _ in survey.processes}
+    foreign = [token for token in survey.view.entities(Kind.PUBLISHER) if token.zid not in own]
     heard = _listen(session, foreign, seconds) if seconds > 0 else []
     off = [
         f"{_who(survey, token)}: its stamps are {abs(first.age) / _SECOND:.2f} s"
@@ -288,7 +272,7 @@ def _listen(
     session: Session, publishers: list[Token], seconds: float
 ) -> list[tuple[Token, _First]]:
     """Return the first sample of each topic that has one in time."""
-    found: dict[str, tuple[Token, _First]] = {}
+    samples: dict[str, tuple[Token, _First]] = {}
     arrived = threading.Condition()
     topics = {
         entity_key(token.domain, token.name, token.type_name, token.type_hash): token
@@ -302,14 +286,14 @@ def _listen(
         except DecodeError as fault:
             first = _First(damage=fault.reason)
         with arrived:
-            found.setdefault(key, (topics[key], first))
+            samples.setdefault(key, (topics[key], first))
             arrived.notify_all()
 
     subscribers = [session.subscriber(key, partial(receive, key)) for key in topics]
     try:
         with arrived:
-            arrived.wait_for(lambda: len(found) == len(topics), seconds)
-            return list(found.values())
+            arrived.wait_for(lambda: len(samples) == len(topics), seconds)
+            return list(samples.values())
     finally:
         for subscriber in subscribers:
             subscriber.close()
@@ -363,8 +347,7 @@ def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
         )
 
 
-def _digests(session: Session, keys: Keys, members: list[Member]) -> dict[str, list[int]]:
-    """Query all replicas at once, and return their digests by session."""
+def _digests(session: Session, keys: Keys, members: list[ReplicaMember]) -> dict[str, list[int]]:
     request = encode(SyncRequest())
     asked = {
         member.zid: session.query(keys.of(member.zid, "sync"), timeout=_TIMEOUT, payload=request)

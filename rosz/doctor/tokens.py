@@ -6,27 +6,15 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
-from rosz.doctor.finding import Finding, error, warning
-from rosz.errors import DecodeError, RoszError, TypeNotFound, near_miss
-from rosz.introspect.survey import Survey
-from rosz.names import short_type
+from rosz.doctor.machine import Finding, error, warning
+from rosz.errors import DecodeError, InvalidName, RoszError, TypeNotFound, near_miss
+from rosz.introspect import Survey
+from rosz.names import check, short_type
 from rosz.session import Session
 from rosz.wire import NO_HASH, Kind, Token, parse_token, tokens_key
 
-__all__ = (
-    "check_clock",
-    "check_domains",
-    "check_duplicates",
-    "check_hashes",
-    "check_hashless",
-    "check_one_sided",
-    "check_packages",
-    "check_types",
-    "check_unreadable",
-)
-
 _BOTH_SIDES = ((Kind.PUBLISHER, Kind.SUBSCRIPTION), (Kind.SERVICE, Kind.CLIENT))
-_HASH_SHOWN = 15
+_HASH_SHOWN = 15  # "RIHS01_" and eight digits
 _REPLY_TIMEOUT = 1.0
 _OTHER = {one: other for pair in _BOTH_SIDES for one, other in (pair, pair[::-1])}
 _VERBS = {
@@ -38,6 +26,8 @@ _VERBS = {
 _CLOCK = "/clock"
 # Topics that nodes publish whether or not anybody subscribes.
 _OFFERED = frozenset({"/rosout", "/rosout_agg", "/parameter_events", _CLOCK, "/diagnostics"})
+# Each action server publishes these; its clients subscribe to them, and they come and go.
+_OF_ACTIONS = ("/_action/feedback", "/_action/status")
 
 
 def _by_name(survey: Survey) -> Iterator[tuple[str, str, list[Token]]]:
@@ -84,12 +74,7 @@ def check_hashes(survey: Survey) -> Iterator[Finding]:
 
 
 def check_hashless(survey: Survey, distro: str) -> Iterator[Finding]:
-    """Find nodes of an old rmw_zenoh, whose tokens have no type hashes.
-
-    Args:
-        survey: The nodes that are running.
-        distro: Value of ``ROS_DISTRO`` here.
-    """
+    """Find nodes of an old rmw_zenoh, whose tokens have no type hashes; Humble's have none."""
     old = [token for token in survey.view.entities() if token.type_hash == NO_HASH]
     if old and distro != "humble":
         yield error(
@@ -112,12 +97,30 @@ def check_unreadable(survey: Survey) -> Iterator[Finding]:
         )
 
 
+def check_names(survey: Survey) -> Iterator[Finding]:
+    """Find names of nodes, topics and services that ROS's rules do not allow."""
+    refused: set[str] = set()
+    for token in survey.view.tokens:
+        for name in (token.node_name, token.name):
+            try:
+                check(name)
+            except InvalidName as fault:
+                refused.add(f"{token.node_name} ({survey.address(token)}): {fault}")
+    if refused:
+        yield error(
+            "refused-name",
+            "nodes use names that others refuse: these can neither subscribe nor call",
+            sorted(refused),
+            "start them with legal names: letters, digits, '_' and '/'",
+        )
+
+
 def check_duplicates(survey: Survey) -> Iterator[Finding]:
     """Find several nodes of one name."""
-    found: defaultdict[str, set[str]] = defaultdict(set)
+    places_of: defaultdict[str, set[str]] = defaultdict(set)
     for token in survey.view.tokens:
-        found[token.node_name].add(f"{survey.address(token)}, node {token.node_id}")
-    for name, places in sorted(found.items()):
+        places_of[token.node_name].add(f"{survey.address(token)}, node {token.node_id}")
+    for name, places in sorted(places_of.items()):
         if len(places) > 1:
             yield error(
                 "duplicate-node",
@@ -137,7 +140,7 @@ def check_one_sided(survey: Survey) -> Iterator[Finding]:
         if len(kinds) > 1 or name in _OFFERED:
             continue
         if kinds == {Kind.PUBLISHER}:
-            unheard += tokens
+            unheard += () if name.endswith(_OF_ACTIONS) else tokens
         elif kinds != {Kind.SERVICE}:
             unsaid += tokens
     if unsaid:
@@ -170,7 +173,7 @@ def check_clock(survey: Survey) -> Iterator[Finding]:
 
 
 def _alone(survey: Survey, lonely: Iterable[Token], others: list[Token]) -> list[str]:
-    """Return a line for each token: what it waits for, and a name that was perhaps meant."""
+    """Return a line for each token, with a similar name that was perhaps meant."""
     lines = set()
     for token in lonely:
         kin = [other.name for other in others if other.type_name == token.type_name]
@@ -198,7 +201,7 @@ def check_packages(
         ends = sorted({f"{token.name}: {_end(survey, token)}" for token in tokens})
         package = type_name.partition("/")[0]
         try:
-            known = hash_of(tokens[0].kind, type_name)
+            hash_here = hash_of(tokens[0].kind, type_name)
         except TypeNotFound as fault:
             yield error(
                 "missing-package",
@@ -215,13 +218,13 @@ def check_packages(
                 "correct the definition: 'rosz pkg check' shows all that is wrong",
             )
         else:
-            if type_hash not in {known, NO_HASH} and distro != "humble":
+            if type_hash not in {hash_here, NO_HASH} and distro != "humble":
                 yield warning(
                     "other-definition",
                     f"{short_type(type_name)} has another definition here: commands and nodes of"
                     " this machine do not reach those",
                     [
-                        f"{end} {type_hash[:_HASH_SHOWN]}…, here {known[:_HASH_SHOWN]}…"
+                        f"{end} {type_hash[:_HASH_SHOWN]}…, here {hash_here[:_HASH_SHOWN]}…"
                         for end in ends
                     ],
                     f"bring the package '{package}' to the version that they have",
@@ -246,7 +249,7 @@ def check_domains(session: Session, survey: Survey) -> Iterator[Finding]:
         names: defaultdict[int, set[str]] = defaultdict(set)
         for token in others:
             names[token.domain].add(token.node_name)
-        lines = [f"domain {one}: {', '.join(sorted(names[one]))}" for one in sorted(names)]
+        lines = [f"domain {domain}: {', '.join(sorted(names[domain]))}" for domain in sorted(names)]
         yield error("wrong-domain", text, lines, remedy)
         return
     text = "nodes of another domain are what nodes of this one wait for"
@@ -265,5 +268,5 @@ def _lacking(survey: Survey, token: Token) -> list[Token]:
     """Return the tokens here for which one of another domain is the missing other side."""
     if survey.view.entities(token.kind, name=token.name):
         return []
-    found = survey.view.entities(_OTHER[token.kind], name=token.name)
-    return [mate for mate in found if mate.type_name == token.type_name]
+    mates = survey.view.entities(_OTHER[token.kind], name=token.name)
+    return [mate for mate in mates if mate.type_name == token.type_name]

@@ -5,26 +5,22 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterable
-from typing import Any, Self
+from typing import Any
 
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.graph.interests import Interest, Interests
 from rosz.graph.view import View
+from rosz.lifecycle import Closing
 from rosz.session import clamp_timeout
-from rosz.wire import ProcessToken, Token
-
-__all__ = ("Followed", "GraphListener", "ProcessListener")
+from rosz.wire import Token
 
 GraphListener = Callable[[Token, bool], None]
 """Function called with a token, and whether it appeared (true) or disappeared (false)."""
 
-ProcessListener = Callable[[ProcessToken, bool], None]
-"""Function called with a rosz node as a process, and whether it appeared or disappeared."""
-
 _numbers = itertools.count()
 
 
-class Followed:
+class Followed(Closing):
     """The tokens that match some key expressions, followed until this is closed.
 
     Args:
@@ -54,18 +50,20 @@ class Followed:
         self._all.draw_on(self._interests)
 
     def view(self) -> View:
-        """Return what is known at this moment; it is not all there is before `complete`."""
-        known = self._known  # replaced whole, so that reading it needs no lock
-        if known is not None and known[0] == self._version():
-            return known[1]
+        """Return the tokens known at this moment; before `complete` some may be missing."""
+        latest = self._known  # replaced whole, so that reading it needs no lock
+        if latest is not None and latest[0] == self._version():
+            return latest[1]
         with self._all.changed:
             version = self._version()
-            view = View.of(token for one in self._interests for token in one.tokens.values())
+            view = View.of(
+                token for interest in self._interests for token in interest.tokens.values()
+            )
             self._known = version, view
             return view
 
     def refresh(self, timeout: float) -> View:
-        """Return what is known, with what a query adds; for callers that cannot wait for tokens.
+        """Return the known tokens and those of a query, for callers that cannot wait for tokens.
 
         Args:
             timeout: Time limit in seconds.
@@ -74,7 +72,9 @@ class Followed:
             ClosedError: The session is closed.
             UsageError: The timeout is not a number.
         """
-        return self._all.query(self._interests, [one.key for one in self._interests], timeout)
+        return self._all.query(
+            self._interests, [interest.key for interest in self._interests], timeout
+        )
 
     def listen(
         self, listener: Callable[[Any, bool], None], *, history: bool = True
@@ -102,7 +102,7 @@ class Followed:
     def wait_for(
         self, condition: Callable[[View], bool], timeout: float, what: str, hint: str = ""
     ) -> View:
-        """Wait until what is followed meets a condition.
+        """Wait until the followed tokens meet a condition.
 
         Args:
             condition: Function that tells whether a view meets it.
@@ -118,20 +118,20 @@ class Followed:
             ClosedError: The graph was closed meanwhile.
             UsageError: The timeout is not a number.
         """
-        found: list[View] = []
+        views: list[View] = []
 
         def is_met() -> bool:
-            # A part of what exists could meet a condition that all of it does not.
+            # A part of the tokens could meet a condition that all of them do not.
             if not self.complete and time.monotonic() < deadline:
                 return False
             view = self.view()
             if condition(view):
-                found.append(view)
-            return bool(found)
+                views.append(view)
+            return bool(views)
 
         deadline = time.monotonic() + clamp_timeout(timeout)
         if self._all.wait_until(is_met, deadline):
-            return found[0]
+            return views[0]
         if self._all.closing:
             raise ClosedError(f"the wait for {what} ended: shutting down")
         raise WaitTimeout(what, timeout, hint)
@@ -144,9 +144,3 @@ class Followed:
 
     def _version(self) -> int:
         return sum(interest.version for interest in self._interests)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -15,18 +15,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TypeVar
 
 from rosz.errors import NotFoundError, WaitTimeout, near_miss
-from rosz.graph.followed import Followed, GraphListener, ProcessListener
+from rosz.graph.followed import Followed, GraphListener
 from rosz.graph.interests import COMPLETE_BY, Interests
 from rosz.graph.view import View
+from rosz.session import Session
 from rosz.wire import Kind, entities_key, node_key, processes_key, tokens_key
-
-if TYPE_CHECKING:
-    from rosz.session import Session
-
-__all__ = ("Graph",)
 
 T = TypeVar("T")
 _HINT_TIMEOUT = 1.0
@@ -99,7 +95,7 @@ class Graph:
         return followed.view()
 
     def known(self) -> View:
-        """Return what is known of all that is followed, also after the graph was closed."""
+        """Return all followed tokens, also after the graph was closed."""
         return self._interests.known()
 
     def refresh(self, timeout: float = 2.0) -> View:
@@ -118,7 +114,7 @@ class Graph:
         return self._interests.query(self._interests.all(), self._all_keys(), timeout)
 
     def find(self, look: Callable[[View], T]) -> T:
-        """Return what a function finds in the graph, for callers that look for a name just once.
+        """Return the result of a search in the graph, for callers that need a name just once.
 
         It looks at the replies to a query first. On a busy machine these may end before all have
         replied; then it looks at all that exists.
@@ -135,39 +131,12 @@ class Graph:
         return look(self.view())
 
     def listen(self, listener: GraphListener, *, history: bool = True) -> Callable[[], None]:
-        """Call a function for every change in the whole domain, in order, on the graph's thread.
-
-        Args:
-            listener: Function called with each token that appears or disappears; exceptions are
-                logged.
-            history: Whether to call it for existing tokens first.
-
-        Returns:
-            A function that unregisters the listener.
+        """Call a function for every change in the whole domain; see `Followed.listen`.
 
         Raises:
             ClosedError: The graph or its session is closed.
         """
-        return self._listen(tokens_key(self.domain), listener, history=history)
-
-    def listen_to_processes(self, listener: ProcessListener) -> Callable[[], None]:
-        """Call a function for every rosz node that exists, appears or disappears.
-
-        Args:
-            listener: Function called on the graph's thread; exceptions are logged.
-
-        Returns:
-            A function that unregisters the listener.
-
-        Raises:
-            ClosedError: The graph or its session is closed.
-        """
-        return self._listen(processes_key(self.domain), listener, history=True)
-
-    def _listen(
-        self, key: str, listener: Callable[[Any, bool], None], *, history: bool
-    ) -> Callable[[], None]:
-        followed = self.follow(key)
+        followed = self.follow(tokens_key(self.domain))
         unregister = followed.listen(listener, history=history)
 
         def stop() -> None:
@@ -192,39 +161,18 @@ class Graph:
 
     def wait_for_node(self, name: str, timeout: float) -> View:
         """Wait for the node of a full name; the errors are those of `wait_for`."""
-        with self.follow(node_key(self.domain, name)) as followed:
-            return self._wait_for_name(
-                followed,
-                lambda view: name in view.nodes(),
-                timeout,
-                f"node '{name}'",
-                name,
-                View.nodes,
-            )
+        followed = self.follow(node_key(self.domain, name))
+        return self._wait_for_name(followed, View.nodes, name, timeout, f"node '{name}'")
 
     def wait_for_topic(self, name: str, timeout: float) -> View:
         """Wait for a publisher of a topic; the errors are those of `wait_for`."""
-        with self.follow_entities(Kind.PUBLISHER, name) as followed:
-            return self._wait_for_name(
-                followed,
-                lambda view: bool(view.publishers(name)),
-                timeout,
-                f"publisher of '{name}'",
-                name,
-                View.topics,
-            )
+        followed = self.follow_entities(Kind.PUBLISHER, name)
+        return self._wait_for_name(followed, View.topics, name, timeout, f"publisher of '{name}'")
 
     def wait_for_service(self, name: str, timeout: float) -> View:
         """Wait for a server of a service; the errors are those of `wait_for`."""
-        with self.follow_entities(Kind.SERVICE, name) as followed:
-            return self._wait_for_name(
-                followed,
-                lambda view: bool(view.servers(name)),
-                timeout,
-                f"service '{name}'",
-                name,
-                View.services,
-            )
+        followed = self.follow_entities(Kind.SERVICE, name)
+        return self._wait_for_name(followed, View.services, name, timeout, f"service '{name}'")
 
     def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> View:
         """Wait for a number of subscriptions of a topic; the errors are those of `wait_for`."""
@@ -238,21 +186,21 @@ class Graph:
     def _wait_for_name(
         self,
         followed: Followed,
-        condition: Callable[[View], bool],
+        names: Callable[[View], Iterable[str]],
+        name: str,
         timeout: float,
         what: str,
-        name: str,
-        names: Callable[[View], Iterable[str]],
     ) -> View:
         try:
-            return followed.wait_for(condition, timeout, what)
+            with followed:
+                return followed.wait_for(lambda view: name in names(view), timeout, what)
         except WaitTimeout as error:
-            known = names(self.refresh(_HINT_TIMEOUT))
-            raise WaitTimeout(what, timeout, near_miss(name, known).removeprefix("; ")) from error
-
-    def _all_keys(self) -> tuple[str, str]:
-        return tokens_key(self.domain), processes_key(self.domain)
+            present = names(self.refresh(_HINT_TIMEOUT))
+            raise WaitTimeout(what, timeout, near_miss(name, present).removeprefix("; ")) from error
 
     def close(self) -> None:
         """Stop following, and wake waiters with `ClosedError`; a second call has no effect."""
         self._interests.close()
+
+    def _all_keys(self) -> tuple[str, str]:
+        return tokens_key(self.domain), processes_key(self.domain)

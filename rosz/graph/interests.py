@@ -9,12 +9,14 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import msgspec
 
 from rosz.errors import ClosedError, DecodeError
 from rosz.graph.view import View
 from rosz.lifecycle import Closable, Lifecycle
-from rosz.session import clamp_timeout
+from rosz.session import Session, clamp_timeout
 from rosz.wire import (
     OWN_SPACE,
     ProcessToken,
@@ -25,13 +27,8 @@ from rosz.wire import (
     processes_key,
 )
 
-if TYPE_CHECKING:
-    from rosz.session import Session
-
-__all__ = ("COMPLETE_BY", "Interest", "Interests")
-
 COMPLETE_BY = 2.0
-"""Seconds after which what is followed counts as complete in any case."""
+"""Seconds after which an interest counts as complete in any case."""
 
 _Report = Callable[[], object]
 """Function that tells listeners of one change."""
@@ -43,14 +40,10 @@ _POLL_SECONDS = 0.1
 _log = logging.getLogger("rosz.graph")
 
 
-class Interest:
+class Interest(msgspec.Struct, eq=False):
     """The live tokens that match one key expression, for all who follow it.
 
     Only the graph changes it, on its thread.
-
-    Args:
-        key: The key expression.
-        name: The topic, service or process's node that the tokens must have; any if empty.
 
     Attributes:
         key: The key expression.
@@ -61,25 +54,24 @@ class Interest:
         began: Time when it was made, by the monotonic clock in seconds.
         complete: Whether it has the tokens that existed when it began.
         users: Number of those who follow it.
-        listeners: Functions called with each change, and whether they get what existed before.
+        listeners: Functions called with each change, and whether they get earlier tokens.
         watch: The watch of the session, once it is declared.
     """
 
-    def __init__(self, key: str, name: str = "") -> None:
-        self.key = key
-        self.name = name
-        self.is_part: bool = False
-        self.tokens: dict[str, Any] = {}
-        self.version: int = 0
-        self.began: float = time.monotonic()
-        self.complete: bool = False
-        self.users: int = 0
-        self.listeners: dict[int, tuple[Callable[[Any, bool], None], bool]] = {}
-        self.watch: Closable | None = None
+    key: str
+    name: str = ""
+    is_part: bool = False
+    tokens: dict[str, Any] = {}
+    version: int = 0
+    began: float = msgspec.field(default_factory=time.monotonic)
+    complete: bool = False
+    users: int = 0
+    listeners: dict[int, tuple[Callable[[Any, bool], None], bool]] = {}
+    watch: Closable | None = None
 
     @property
     def settled(self) -> bool:
-        """Whether it has what existed when it began, or that takes too long."""
+        """Whether it has the tokens that existed at its beginning, or that takes too long."""
         return self.complete or time.monotonic() - self.began > COMPLETE_BY
 
 
@@ -113,7 +105,7 @@ class Interests:
             return list(self._interests.values())
 
     def acquire(self, keys: Iterable[tuple[str, str]], *, many: bool) -> list[Interest]:
-        """Follow what matches some key expressions, until `release`.
+        """Follow the tokens that match some key expressions, until `release`.
 
         Args:
             keys: The key expressions, each with the name that the tokens must have, or none.
@@ -132,7 +124,7 @@ class Interests:
         return interests
 
     def draw_on(self, whole: Iterable[Interest]) -> None:
-        """Take the tokens of single names from what is followed for good from now on.
+        """Take the tokens of single names from interests that stay, from now on.
 
         A watch costs two threads.
 
@@ -147,26 +139,28 @@ class Interests:
         return self._lifecycle.closing
 
     def query(self, interests: Sequence[Interest], keys: Iterable[str], timeout: float) -> View:
-        """Return what is known of some interests, with what a query for some keys adds."""
+        """Return the tokens of some interests, and those of a query for some keys."""
         timeout = clamp_timeout(timeout)
         # A token that a watch receives while the query runs may be missing in the replies.
-        self.wait_until(lambda: all(one.settled for one in interests), time.monotonic() + timeout)
-        found = [token for key in keys for token in self._session.live_tokens(key, timeout)]
+        self.wait_until(
+            lambda: all(interest.settled for interest in interests), time.monotonic() + timeout
+        )
+        live = [token for key in keys for token in self._session.live_tokens(key, timeout)]
         self._apply_pending(timeout)
-        known = self._known(interests)
+        tokens = self._known(interests)
         # Only in the result: nothing may report the end of a token that was never watched.
-        for key in found:
-            if key not in known and (token := self._parse(key)) is not None:
-                known[key] = token
-        return View.of(known.values())
+        for key in live:
+            if key not in tokens and (token := self._parse(key)) is not None:
+                tokens[key] = token
+        return View.of(tokens.values())
 
     def known(self) -> View:
-        """Return what is known of all interests, or was when the graph was closed."""
+        """Return the tokens of all interests, or those at the closing of the graph."""
         return View.of(self._known(self.all()).values())
 
     def _known(self, interests: Iterable[Interest]) -> dict[str, Any]:
         with self.changed:
-            return {key: token for one in interests for key, token in one.tokens.items()}
+            return {key: token for interest in interests for key, token in interest.tokens.items()}
 
     def register(
         self,
@@ -176,7 +170,7 @@ class Interests:
         *,
         history: bool,
     ) -> None:
-        """Call a listener for what is known of an interest, and for each change of it."""
+        """Call a listener for each token of an interest, and for each change of it."""
 
         def begin(tokens: list[Any]) -> None:
             interest.listeners[number] = listener, history
@@ -233,7 +227,7 @@ class Interests:
             interest = self._interests[key] = Interest(key, name)
             interest.users = 1
             whole = self._whole
-            interest.is_part = bool(name and whole) and all(one.settled for one in whole)
+            interest.is_part = bool(name and whole) and all(other.settled for other in whole)
         if interest.is_part:
             self._events.put(partial(self._begin_part, interest))
             return interest
@@ -252,7 +246,7 @@ class Interests:
         return interest
 
     def _begin_part(self, interest: Interest) -> None:
-        """Give a part what is known of the whole domain."""
+        """Give a part its tokens of the whole domain."""
         with self.changed:
             for whole in self._whole:
                 for key, token in whole.tokens.items():
@@ -320,17 +314,17 @@ class Interests:
 
     def _apply(self, interest: Interest, key: str, alive: bool) -> _Report | None:
         """Add or remove a token, and return the report of it if that is a change."""
-        known = interest.tokens
-        if alive == (key in known):
+        tokens = interest.tokens
+        if alive == (key in tokens):
             return None
-        token = self._parse(key) if alive else known[key]
+        token = self._parse(key) if alive else tokens[key]
         if token is None or interest.name not in {"", _name_of(token)}:
             return None
         with self.changed:
             if alive:
-                known[key] = token
+                tokens[key] = token
             else:
-                del known[key]
+                del tokens[key]
             interest.version += 1
             self._version += 1
             self.changed.notify_all()
@@ -339,7 +333,7 @@ class Interests:
         if part is None or not part.is_part:
             return report
         reports = [report, self._apply(part, key, alive)]
-        return lambda: [one() for one in reports if one is not None]
+        return lambda: [action() for action in reports if action is not None]
 
     def _parse(self, key: str) -> Token | ProcessToken | None:
         """Parse a token; each kind of damage is logged once."""

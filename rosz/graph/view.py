@@ -1,4 +1,4 @@
-"""A set of liveliness tokens, and what can be read from it; pure."""
+"""A set of liveliness tokens, and the nodes and entities that it describes; pure."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from typing import Self
 
 from rosz.wire import Kind, ProcessToken, Token
 
-__all__ = ("View",)
-
 
 class View:
-    """Nodes and entities of one domain at one moment: all, or what is followed of them.
+    """Nodes and entities of one domain at one moment: all, or the followed ones.
 
     Args:
         tokens: The live tokens; several may describe one node.
@@ -27,17 +25,17 @@ class View:
     @classmethod
     def of(cls, tokens: Iterable[Token | ProcessToken]) -> Self:
         """Return the view of live tokens of both kinds."""
-        found = list(tokens)
+        everything = list(tokens)
         return cls(
-            (one for one in found if isinstance(one, Token)),
-            (one for one in found if isinstance(one, ProcessToken)),
+            (token for token in everything if isinstance(token, Token)),
+            (token for token in everything if isinstance(token, ProcessToken)),
         )
 
     def nodes(self) -> list[str]:
         """Return the full names of all nodes, sorted; two nodes of one name appear twice."""
         # The token of an entity alone makes its node known: tokens may arrive in any order.
-        found = {(t.zid, t.node_id, t.node_name) for t in self.tokens}
-        return sorted(name for _, _, name in found)
+        numbered = {(t.zid, t.node_id, t.node_name) for t in self.tokens}
+        return sorted(name for _, _, name in numbered)
 
     def processes(self, node: str | None = None) -> list[ProcessToken]:
         """Return the rosz nodes as processes, the oldest of each name first.
@@ -89,14 +87,14 @@ class View:
 
     @cached_property
     def _by_name(self) -> dict[str, list[Token]]:
-        found: defaultdict[str, list[Token]] = defaultdict(list)
+        tokens: defaultdict[str, list[Token]] = defaultdict(list)
         for token in self.tokens:
-            found[token.name].append(token)
-        return dict(found)
+            tokens[token.name].append(token)
+        return dict(tokens)
 
     def _types(self, *kinds: Kind) -> dict[str, list[str]]:
-        found: defaultdict[str, set[str]] = defaultdict(set)
+        types: defaultdict[str, set[str]] = defaultdict(set)
         for token in self.tokens:
             if token.kind in kinds:
-                found[token.name].add(token.type_name)
-        return {name: sorted(found[name]) for name in sorted(found)}
+                types[token.name].add(token.type_name)
+        return {name: sorted(types[name]) for name in sorted(types)}

@@ -1,13 +1,14 @@
 """Interface definitions: .msg, .srv and .action texts, their specs, hashes and Python source.
 
 ``grammar`` parses one text, ``catalog`` finds the types that it refers to, ``hashes`` identifies
-the result to ROS 1 and ROS 2. ``classes``, ``encode`` and ``decode`` write Python. The modules
-``generate``, which writes the modules of packages, and ``cache``, which runs and stores generated
-sources, are public as well. Pure; may import floor 0.
+the result to ROS 1 and ROS 2. ``classes`` writes Python, with the emitter of ``rosz.message``. The
+module ``generate``, which writes the modules of packages, is public as well. Pure; may import
+floor 0.
 """
 
 from __future__ import annotations
 
+from rosz.idl.cache import SourceCache
 from rosz.idl.catalog import (
     Catalog,
     Definition,
@@ -29,10 +30,20 @@ from rosz.idl.hashes import (
     service_md5,
     service_parts,
 )
-from rosz.idl.names import action_of, class_name, is_service, is_service_message
-from rosz.idl.spec import ActionSpec, Constant, Field, FieldType, MessageSpec, ServiceSpec
+from rosz.idl.spec import (
+    ActionSpec,
+    Constant,
+    Field,
+    FieldType,
+    MessageSpec,
+    ServiceSpec,
+    action_of,
+    class_name,
+    is_service,
+    is_service_message,
+)
 
-PUBLIC_MODULES = ("cache", "generate")
+PUBLIC_MODULES = ("generate",)
 
 __all__ = (
     "ActionSpec",
@@ -44,6 +55,7 @@ __all__ = (
     "Folders",
     "MessageSpec",
     "ServiceSpec",
+    "SourceCache",
     "action_hash",
     "action_of",
     "action_type",

@@ -1,7 +1,8 @@
 """A cache of generated sources in a folder, which other processes use too.
 
-The name of a source is made of what it was generated from, so a cached source is never stale. Where
-the folder cannot be written, the source stays in memory; tracebacks show its lines either way.
+The name of a source is a hash of its definitions and of the generator, so a cached source is never
+stale. Where the folder cannot be written, the source stays in memory; tracebacks show its lines
+either way.
 """
 
 from __future__ import annotations
@@ -13,8 +14,6 @@ from importlib.util import cache_from_source, module_from_spec, spec_from_loader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-
-__all__ = ("SourceCache",)
 
 
 class SourceCache:
@@ -45,12 +44,12 @@ class SourceCache:
             write: Function that generates the source.
         """
         file = self._folder / f"{stem}.py" if self._folder is not None else None
-        if file is not None and file.is_file():
+        if file is not None:
             try:
                 module = _run(name, SourceFileLoader(name, str(file)), namespace)
                 if all(hasattr(module, member) for member in members):
                     return module
-            except Exception:  # noqa: BLE001, S110  # a damaged file is generated again
+            except Exception:  # noqa: BLE001, S110  # what is missing or damaged is generated
                 pass
         source = write()
         if file is not None and _write(file, source):

@@ -10,18 +10,15 @@ import msgspec
 
 from rosz.errors import DefinitionError, TypeNotFound, near_miss
 from rosz.idl.grammar import parse_action, parse_message, parse_service
-from rosz.idl.names import action_of, is_service, is_service_message
-from rosz.idl.spec import PRIMITIVES, ActionSpec, Field, MessageSpec, ServiceSpec
-
-__all__ = (
-    "Catalog",
-    "Definition",
-    "Folders",
-    "action_messages",
-    "action_type",
-    "full_name",
-    "read_definition",
-    "split_definitions",
+from rosz.idl.spec import (
+    PRIMITIVES,
+    ActionSpec,
+    Field,
+    MessageSpec,
+    ServiceSpec,
+    action_of,
+    is_service,
+    is_service_message,
 )
 
 _NEXT_DEFINITION = re.compile(r"^=+[ \t]*\r?\nMSG:[ \t]*(\S+)[ \t]*\r?\n", re.MULTILINE)
@@ -85,9 +82,9 @@ def action_messages(name: str, text: str) -> dict[str, str]:
     """
     # Text after a third line of dashes stays in the last part, whose parser refuses it.
     texts = _DASHES.split(text, maxsplit=2)
-    found = {name + suffix: part for suffix, part in zip(_PARTS, texts, strict=False)}
-    found |= {name + suffix: form.format(name=name) for suffix, form in _ENVELOPES.items()}
-    return {one: found.get(one, "") for one in _action_parts(name)}
+    texts_by_part = {name + suffix: part for suffix, part in zip(_PARTS, texts, strict=False)}
+    texts_by_part |= {name + suffix: form.format(name=name) for suffix, form in _ENVELOPES.items()}
+    return {part_name: texts_by_part.get(part_name, "") for part_name in _action_parts(name)}
 
 
 class Definition(msgspec.Struct, frozen=True):
@@ -178,14 +175,14 @@ class Catalog:
 
     def below(self, spec: MessageSpec) -> dict[str, MessageSpec]:
         """Return all message types that a message holds, at any depth, by name."""
-        found: dict[str, MessageSpec] = {}
+        specs: dict[str, MessageSpec] = {}
         rest = [spec]
         while rest:
             for nested in self.nested(rest.pop()):
-                if nested.name not in found:
-                    found[nested.name] = nested
+                if nested.name not in specs:
+                    specs[nested.name] = nested
                     rest.append(nested)
-        return found
+        return specs
 
     def nested(self, spec: MessageSpec) -> Iterator[MessageSpec]:
         """Yield the spec of each field that is a message."""
@@ -309,9 +306,9 @@ class Folders:
                 made = action_type(action, self.find(action), base)
             if made is not None:
                 return made
-            known = [one.rpartition("/")[2] for one in self.names(package, kind)]
+            bases = [member.rpartition("/")[2] for member in self.names(package, kind)]
             raise TypeNotFound(
-                name, f"'{folder / kind}' has no '{base}.{kind}'{near_miss(base, known)}"
+                name, f"'{folder / kind}' has no '{base}.{kind}'{near_miss(base, bases)}"
             )
         return read_definition(file)
 
@@ -319,6 +316,8 @@ class Folders:
         """Return the definition of a message that is made of an action, if there is one."""
         for file in (folder / "action").glob("*.action"):
             if base in _action_parts(file.stem):
-                found = read_definition(file)
-                return Definition(action_messages(file.stem, found.text)[base], found.path)
+                definition = read_definition(file)
+                return Definition(
+                    action_messages(file.stem, definition.text)[base], definition.path
+                )
         return None

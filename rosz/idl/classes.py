@@ -5,24 +5,25 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Sequence
+from typing import Any
 
 from rosz.idl.catalog import Catalog
-from rosz.idl.decoder_source import Decoder
-from rosz.idl.encoder_source import Encoder
 from rosz.idl.hashes import action_hash, message_hash, message_md5, service_hash, service_md5
-from rosz.idl.names import (
+from rosz.idl.spec import (
     ACTION_MESSAGES,
     ACTION_SERVICES,
-    ClassNames,
-    ModuleNames,
+    ActionSpec,
+    Field,
+    FieldType,
+    MessageSpec,
+    Scalar,
+    ServiceSpec,
     attribute,
     class_name,
 )
-from rosz.idl.spec import ActionSpec, Field, FieldType, MessageSpec, Scalar, ServiceSpec
-from rosz.message import ARRAY_CODES, OCTETS
+from rosz.message import ARRAY_CODES, CDR, OCTETS, DecoderSource, EncoderSource, Slot, SourceNames
 from rosz.names import short_type
-
-__all__ = ("action_class", "message_class", "service_class")
 
 _TIME = "builtin_interfaces/msg/Time"
 _DURATION = "builtin_interfaces/msg/Duration"
@@ -59,6 +60,78 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 _CONDITION = re.compile(r"( *)if (.+ or .+):")
 
 
+class ModuleNames(SourceNames):
+    """The names that a generated module imports and defines, besides its own classes.
+
+    Args:
+        own: Full names of the types whose classes the module defines.
+        catalog: Specs of all types in them.
+    """
+
+    def __init__(self, own: list[str], catalog: Catalog) -> None:
+        super().__init__(CDR)
+        self._catalog = catalog
+        self._own = {class_name(name): name for name in own}
+        self._imports: dict[str, str] = {}
+        self._slots: dict[str, tuple[Slot, ...]] = {}
+
+    @property
+    def imports(self) -> dict[str, str]:
+        """Classes of other modules, from full type name to name in this module."""
+        return dict(self._imports)
+
+    def class_of(self, name: str) -> str:
+        """Return the name of the class of a type in this module."""
+        plain = class_name(name)
+        if self._own.get(plain) == name:
+            return plain
+        if name not in self._imports:
+            taken = set(self._imports.values()) | set(self._own)
+            self._imports[name] = plain if plain not in taken else name.replace("/", "_")
+        return self._imports[name]
+
+    def fields(self, kind: MessageSpec) -> tuple[Slot, ...]:
+        """Return the fields of a message; those that are messages have specs as their kinds."""
+        if kind.name in self._slots:
+            return self._slots[kind.name]
+        slots = []
+        for field in kind.fields:
+            given = field.type
+            below: Any = given.base if given.primitive else self._catalog.message(given.base)
+            slots.append(Slot(attribute(field.name), below, given.bound, given.shape, given.size))
+        return self._slots.setdefault(kind.name, tuple(slots))
+
+    def cls(self, kind: MessageSpec) -> str:
+        """Return the name of the class of a message."""
+        return self.class_of(kind.name)
+
+    def make(self, kind: MessageSpec, values: Sequence[str]) -> str:
+        """Return an expression that makes a message, by the expressions of its fields."""
+        unsent = ["0"] if kind.name == _HEADER else []  # the sequence number
+        return f"{self.cls(kind)}({', '.join([*unsent, *values])})"
+
+
+class ClassNames:
+    """The names of a module as the body of a class sees them, where a field may hide a class.
+
+    Args:
+        module: Names of the module.
+        hidden: Names that the class defines.
+
+    Attributes:
+        module: Names of the module.
+    """
+
+    def __init__(self, module: ModuleNames, hidden: set[str]) -> None:
+        self._hidden = hidden
+        self.module = module
+
+    def cls(self, name: str) -> str:
+        """Return the name of a message class; a second one where the first is hidden."""
+        plain = self.module.class_of(name)
+        return self.module.define("_c", plain) if plain in self._hidden else plain
+
+
 def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> str:
     """Return the source of a message class.
 
@@ -72,20 +145,22 @@ def message_class(spec: MessageSpec, catalog: Catalog, module: ModuleNames) -> s
     plain = "_Stamped" if _is_stamped(spec) else "_Message"
     base = "_Renamed" if renamed else BASES.get(spec.name, plain)
     fields = {attribute(field.name) for field in spec.fields}
-    names = ClassNames(module, fields | {attribute(one.name) for one in spec.constants})
+    names = ClassNames(module, fields | {attribute(constant.name) for constant in spec.constants})
     ros2 = _ROS2_DEFAULTS.get(spec.name, set())
     body = [_field(field, names, ros2=field.name in ros2) for field in spec.fields]
     body += _ros1_fields(renamed)
-    body += [f"{attribute(one.name)} = {_literal(one.value)}" for one in spec.constants]
+    body += [
+        f"{attribute(constant.name)} = {_literal(constant.value)}" for constant in spec.constants
+    ]
     body += _names(spec.name, message_hash(spec, catalog), message_md5(spec, catalog), spec.text)
     body += [f"_schema = {_schema(spec, names)}", ""]
     body += _codec(
-        "_encode(m: _Any) -> bytes", Encoder(spec, catalog, module).lines(), "_plain(m, {0})", name
+        "_encode(m: _Any) -> bytes", EncoderSource(spec, module).lines(), "_plain(m, {0})", name
     )
     body += [""]
     body += _codec(
         f"_decode(data: bytes) -> {name}",
-        Decoder(spec, catalog, module).lines(),
+        DecoderSource(spec, module).lines(),
         "_explain(data, {0})",
         name,
     )
@@ -136,8 +211,10 @@ def _docstring(text: str) -> list[str]:
 def _escape(text: str) -> str:
     """Return a line of a comment as it stands in a docstring; quotes become single ones."""
     return "".join(
-        one if one.isprintable() and one != "\\" else one.encode("unicode_escape").decode()
-        for one in text.replace('"', "'")
+        letter
+        if letter.isprintable() and letter != "\\"
+        else letter.encode("unicode_escape").decode()
+        for letter in text.replace('"', "'")
     )
 
 

@@ -12,7 +12,6 @@ import re
 from typing import NoReturn
 
 from rosz.errors import DefinitionError
-from rosz.idl.names import is_service_message
 from rosz.idl.spec import (
     PRIMITIVES,
     ActionSpec,
@@ -24,10 +23,9 @@ from rosz.idl.spec import (
     ServiceSpec,
     Shape,
     Value,
+    is_service_message,
 )
 from rosz.message import INTEGER_RANGES
-
-__all__ = ("parse_action", "parse_message", "parse_service")
 
 _TYPE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
@@ -155,7 +153,7 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
     constants: list[Constant] = []
     taken: dict[str, int] = {}
     for number, line in enumerate(lines, start):
-        parsed = _Line(line.rstrip("\r"), number, path, name.partition("/")[0]).parse()
+        parsed = _DefinitionLine(line.rstrip("\r"), number, path, name.partition("/")[0]).parse()
         if parsed is None:
             continue
         if parsed.name in taken:
@@ -175,11 +173,11 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
 
 def _column(line: str, name: str) -> int:
     """Return the 1-based column of the name that a line declares."""
-    found = re.search(rf"[ \t]({re.escape(name)})\b", line)
-    return found.start(1) + 1 if found else 0
+    match = re.search(rf"[ \t]({re.escape(name)})\b", line)
+    return match.start(1) + 1 if match else 0
 
 
-class _Line:
+class _DefinitionLine:
     """One line, and the offset up to which it has been read."""
 
     def __init__(self, text: str, number: int, path: str, package: str) -> None:
@@ -210,7 +208,7 @@ class _Line:
         return word[0] if word else self._text[self._at : self._at + 1]
 
     def parse(self) -> Field | Constant | None:
-        """Return what the line declares, if anything."""
+        """Return the field or constant of the line; None if it has none."""
         self._skip()
         if self._done() or self._text.startswith("@key", self._at):
             return None
@@ -246,8 +244,8 @@ class _Line:
 
     def _shown_type(self, start: int) -> str:
         """Return the beginning of an error about a type: its whole word, and the field's name."""
-        found = _TYPE_WORD.match(self._text, start)
-        word, name = (found[1], found[2]) if found else ("", None)
+        match = _TYPE_WORD.match(self._text, start)
+        word, name = (match[1], match[2]) if match else ("", None)
         return f"type '{word}' of '{name}': " if name else f"type '{word}': "
 
     def _resolve(self, written: str, start: int) -> str:
@@ -416,18 +414,18 @@ class _Line:
     def _string(self, kind: FieldType, bare: re.Pattern[str]) -> str:
         quote = self._text[self._at : self._at + 1]
         if quote in ("'", '"'):
-            found = _QUOTED.match(self._text, self._at)
-            if found is None:
+            match = _QUOTED.match(self._text, self._at)
+            if match is None:
                 self._fail(f"the string is not closed; expected {quote}")
-            value = self._checked(_unquote(found[0]))
+            value = self._checked(_unquote(match[0]))
         else:
-            found = bare.match(self._text, self._at)
-            if found is None:
+            match = bare.match(self._text, self._at)
+            if match is None:
                 self._fail("expected a string")
-            value = self._checked(found[0])
+            value = self._checked(match[0])
         if kind.bound and len(value.encode()) > kind.bound:
             self._fail(f"'{value}' is longer than the {kind.bound} bytes of its type")
-        self._at = found.end()
+        self._at = match.end()
         return value
 
     def _checked(self, value: str) -> str:

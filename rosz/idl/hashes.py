@@ -1,10 +1,10 @@
 """The hashes that ROS 1 (md5) and ROS 2 (RIHS01) identify a definition by.
 
 ROS 1's is genmsg's: constants first, then fields, each on a line without comments and blanks; a
-field that is a message stands as the hash of that message. ROS 2's spellings of what is built into
-ROS 1 count as ROS 1's: ``builtin_interfaces/Time`` as ``time``, and any ``std_msgs/Header`` as the
-one with ``seq``. So a text that means the same in both has the hash that ROS 1 gives it. The few
-types that ROS 2 has changed have the hash of ROS 1's text.
+field that is a message stands as the hash of that message. ROS 2's spellings of types that are
+built into ROS 1 count as ROS 1's: ``builtin_interfaces/Time`` as ``time``, and any
+``std_msgs/Header`` as the one with ``seq``. So a text that means the same in both has the hash that
+ROS 1 gives it. The few types that ROS 2 has changed have the hash of ROS 1's text.
 
 ROS 2's (REP 2016) is SHA-256 over a JSON text that describes the fields of the type and of all
 types in it; constants, defaults and comments are not part of it.
@@ -17,19 +17,15 @@ from collections.abc import Iterable
 from typing import Any
 
 from rosz.idl.catalog import Catalog
-from rosz.idl.names import ACTION_MESSAGES, ACTION_SERVICES, is_service
-from rosz.idl.spec import ActionSpec, Field, FieldType, MessageSpec, ServiceSpec
-
-__all__ = (
-    "action_hash",
-    "describe",
-    "describe_field",
-    "identity",
-    "message_hash",
-    "message_md5",
-    "service_hash",
-    "service_md5",
-    "service_parts",
+from rosz.idl.spec import (
+    ACTION_MESSAGES,
+    ACTION_SERVICES,
+    ActionSpec,
+    Field,
+    FieldType,
+    MessageSpec,
+    ServiceSpec,
+    is_service,
 )
 
 _BUILTIN = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}
@@ -46,8 +42,8 @@ _MD5_IN_ROS1 = {
     "470cee326c156c680917c830889c04a6": "c005c34273dc426c67a020a87bc24148",  # Range
     "8c7314fcbb621a6a7a6af3200d726861": "d8f8cbc74c5ff283fca29569ccefb45d",  # SolidPrimitive
 }
-"""The hash of ROS 1's text by the hash of ROS 2's, of types that ROS 2 has changed: what a ROS 1
-peer calls the type."""
+"""The hash of ROS 1's text by the hash of ROS 2's, of types that ROS 2 has changed: ROS 1's
+peers identify the type by it."""
 
 
 def message_md5(spec: MessageSpec, catalog: Catalog) -> str:
@@ -71,7 +67,7 @@ def _md5(text: str) -> str:
 
 
 def _md5_text(spec: MessageSpec, catalog: Catalog) -> str:
-    lines = [f"{one.type} {one.name}={one.text}" for one in spec.constants]
+    lines = [f"{constant.type} {constant.name}={constant.text}" for constant in spec.constants]
     lines += [f"{_md5_type(field.type, catalog)} {field.name}" for field in spec.fields]
     return "\n".join(lines).strip()
 

@@ -1,26 +1,13 @@
-"""Specs: the content of definitions, independent of how their text is written."""
+"""Specs: the content of definitions, independent of how their text is written; names of types."""
 
 from __future__ import annotations
 
+import keyword
 from typing import Literal, TypeAlias
 
 import msgspec
 
 from rosz.message import SCALAR_CODES
-
-__all__ = (
-    "PRIMITIVES",
-    "ActionSpec",
-    "Constant",
-    "Field",
-    "FieldType",
-    "MessageSpec",
-    "Scalar",
-    "ServiceSpec",
-    "Shape",
-    "Value",
-    "element_of",
-)
 
 Shape: TypeAlias = Literal["one", "fixed", "bounded", "sequence"]
 Scalar: TypeAlias = bool | int | float | str
@@ -63,11 +50,6 @@ class FieldType(msgspec.Struct, frozen=True):
         if self.shape == "one":
             return ""
         return {"fixed": f"[{self.size}]", "bounded": f"[<={self.size}]"}.get(self.shape, "[]")
-
-
-def element_of(kind: FieldType) -> FieldType:
-    """Return the type of one element of a sequence."""
-    return FieldType(kind.base, kind.bound)
 
 
 class Field(msgspec.Struct, frozen=True):
@@ -141,3 +123,51 @@ class ActionSpec(msgspec.Struct, frozen=True):
     feedback: MessageSpec
     text: str = ""
     path: str = "<string>"
+
+
+ACTION_MESSAGES = ("Goal", "Result", "Feedback", "FeedbackMessage")
+"""The messages that ROS 2 makes of an action, behind its name and ``_``."""
+
+ACTION_SERVICES = ("SendGoal", "GetResult")
+"""The services that ROS 2 makes of an action."""
+
+SERVICE_MESSAGES = ("Request", "Response", "Event")
+"""The messages that ROS 2 makes of a service, behind its name and ``_``."""
+
+
+def attribute(name: str) -> str:
+    """Return the attribute of a field or constant; a keyword of Python gets a ``_``."""
+    return f"{name}_" if keyword.iskeyword(name) else name
+
+
+def class_name(name: str) -> str:
+    """Return the class name of a full type name: ``Twist``, ``SetBoolRequest``, ``SetBool``."""
+    _, kind, base = name.split("/")  # those of actions are named as rclpy names them
+    for part in ("Request", "Response"):
+        if kind == "srv" and base.endswith(f"_{part}"):
+            return base.removesuffix(f"_{part}") + part
+    return attribute(base)
+
+
+def action_of(base: str) -> str:
+    """Return the action that a type in an ``action`` folder belongs to, both without packages.
+
+    ``Fibonacci_Goal`` gives ``Fibonacci``, and so does ``Fibonacci``.
+    """
+    action, _, part = base.rpartition("_")
+    return action if action and part in (*ACTION_MESSAGES, *ACTION_SERVICES) else base
+
+
+def is_service(name: str) -> bool:
+    """Return whether a full name is that of a service, such as one of the two of an action."""
+    _, kind, base = name.split("/")
+    part = base.removeprefix(f"{action_of(base)}_")
+    return (kind == "srv" and not is_service_message(name)) or (
+        kind == "action" and part in ACTION_SERVICES
+    )
+
+
+def is_service_message(name: str) -> bool:
+    """Return whether a full name is that of a message that ROS 2 makes of a service."""
+    _, kind, base = name.split("/")
+    return kind == "srv" and base.rpartition("_")[2] in SERVICE_MESSAGES and "_" in base

@@ -1,27 +1,199 @@
-"""Inspect a running system: what the commands list, measure, send and query.
+"""Inspect a running system, as the commands do: list, measure, send and query.
 
 ``connect`` opens the session of a command, and ``survey`` takes a snapshot of the network;
-``topics``, ``services``, ``actions``, ``nodes`` and ``definitions`` list and describe what is
-there, as ROS 1's tools do. ``subscribe``, ``fields``, ``echo``, ``measure`` and ``rosout`` follow
-topics; ``arguments`` and ``publish`` send messages that are written as YAML. Each module is public
-and imported alone, since a command has to start fast; nothing is imported here.
+``topics``, ``services``, ``nodes`` and ``definitions`` list and describe the
+system, as ROS 1's tools do. ``subscribe``, ``fields``, ``echo``, ``measure`` and ``rosout`` follow
+topics; ``arguments`` and ``publish`` send messages that are written as YAML. The names are imported
+on first use, since a command has to start fast.
 """
 
-PUBLIC_MODULES = (
-    "actions",
-    "arguments",
-    "connect",
-    "definitions",
-    "echo",
-    "fields",
-    "measure",
-    "nodes",
-    "publish",
-    "rosout",
-    "services",
-    "subscribe",
-    "survey",
-    "topics",
-)
+from __future__ import annotations
 
-__all__: tuple[str, ...] = ()
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False  # typing takes longer to import than everything else here
+if TYPE_CHECKING:
+    from rosz.introspect.arguments import (
+        list_arguments,
+        make_message,
+        read_arguments,
+        read_file,
+        read_stream,
+        with_arguments,
+    )
+    from rosz.introspect.connect import command_config, find_unreached, open_context, open_session
+    from rosz.introspect.definitions import Definitions
+    from rosz.introspect.echo import (
+        Echo,
+        EchoOptions,
+        dump_bytes,
+        plot_columns,
+        plot_values,
+        shorten,
+    )
+    from rosz.introspect.fields import FieldPath, Filter, FilterFailed, Loader, Target, find_target
+    from rosz.introspect.measure import (
+        BandwidthMeter,
+        BandwidthStats,
+        DelayMeter,
+        DelayStats,
+        RateMeter,
+        format_bandwidth,
+        format_delay,
+        format_rate,
+        format_rates,
+        read_stamp,
+    )
+    from rosz.introspect.nodes import (
+        PING_TIMEOUT,
+        NodeEntry,
+        find_nodes,
+        format_connections,
+        format_node,
+        get_info,
+        get_levels,
+        kill,
+        kill_nodes,
+        list_nodes,
+        machines,
+        nodes_on_machine,
+        ping,
+        set_level,
+    )
+    from rosz.introspect.publish import DEFAULT_RATE, ONCE_SECONDS, Sender, SendOptions
+    from rosz.introspect.rosout import LogFilter, LogLine, format_line, read_line
+    from rosz.introspect.services import (
+        call_service,
+        find_server,
+        list_services,
+        service_key,
+        services_of_type,
+        wait_for_server,
+    )
+    from rosz.introspect.subscribe import (
+        find_class,
+        find_token,
+        resolve_field,
+        subscribe_samples,
+        topic_types,
+        wait_for_target,
+    )
+    from rosz.introspect.survey import Survey, process_address, take_survey
+    from rosz.introspect.topics import (
+        Topic,
+        by_host,
+        entity_row,
+        find_topic,
+        format_topic,
+        format_topics,
+        in_namespace,
+        list_topics,
+        topics_of_type,
+    )
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "arguments": "list_arguments make_message read_arguments read_file read_stream"
+            " with_arguments",
+            "connect": "command_config find_unreached open_context open_session",
+            "definitions": "Definitions",
+            "echo": "Echo EchoOptions dump_bytes plot_columns plot_values shorten",
+            "fields": "FieldPath Filter FilterFailed Loader Target find_target",
+            "measure": "BandwidthMeter BandwidthStats DelayMeter DelayStats RateMeter"
+            " format_bandwidth format_delay format_rate format_rates read_stamp",
+            "nodes": "PING_TIMEOUT NodeEntry find_nodes format_connections format_node get_info"
+            " get_levels kill kill_nodes list_nodes machines nodes_on_machine ping set_level",
+            "publish": "DEFAULT_RATE ONCE_SECONDS Sender SendOptions",
+            "rosout": "LogFilter LogLine format_line read_line",
+            "services": "call_service find_server list_services service_key services_of_type"
+            " wait_for_server",
+            "subscribe": "find_class find_token resolve_field subscribe_samples topic_types"
+            " wait_for_target",
+            "survey": "Survey process_address take_survey",
+            "topics": "Topic by_host entity_row find_topic format_topic format_topics in_namespace"
+            " list_topics topics_of_type",
+        },
+    )
+
+__all__ = (
+    "DEFAULT_RATE",
+    "ONCE_SECONDS",
+    "PING_TIMEOUT",
+    "BandwidthMeter",
+    "BandwidthStats",
+    "Definitions",
+    "DelayMeter",
+    "DelayStats",
+    "Echo",
+    "EchoOptions",
+    "FieldPath",
+    "Filter",
+    "FilterFailed",
+    "Loader",
+    "LogFilter",
+    "LogLine",
+    "NodeEntry",
+    "RateMeter",
+    "SendOptions",
+    "Sender",
+    "Survey",
+    "Target",
+    "Topic",
+    "by_host",
+    "call_service",
+    "command_config",
+    "dump_bytes",
+    "entity_row",
+    "find_class",
+    "find_nodes",
+    "find_server",
+    "find_target",
+    "find_token",
+    "find_topic",
+    "find_unreached",
+    "format_bandwidth",
+    "format_connections",
+    "format_delay",
+    "format_line",
+    "format_node",
+    "format_rate",
+    "format_rates",
+    "format_topic",
+    "format_topics",
+    "get_info",
+    "get_levels",
+    "in_namespace",
+    "kill",
+    "kill_nodes",
+    "list_arguments",
+    "list_nodes",
+    "list_services",
+    "list_topics",
+    "machines",
+    "make_message",
+    "nodes_on_machine",
+    "open_context",
+    "open_session",
+    "ping",
+    "plot_columns",
+    "plot_values",
+    "process_address",
+    "read_arguments",
+    "read_file",
+    "read_line",
+    "read_stamp",
+    "read_stream",
+    "resolve_field",
+    "service_key",
+    "services_of_type",
+    "set_level",
+    "shorten",
+    "subscribe_samples",
+    "take_survey",
+    "topic_types",
+    "topics_of_type",
+    "wait_for_server",
+    "wait_for_target",
+    "with_arguments",
+)

@@ -7,20 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from rosz.errors import EncodeError, NotFoundError, UsageError, YamlError
-from rosz.message import slots
-from rosz.message.convert import fill_message_args
+from rosz.message import fill_message_args, slots
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.params.yaml import read_plain
 from rosz.time import DurationValue, TimeValue
-
-__all__ = (
-    "list_arguments",
-    "make_message",
-    "read_arguments",
-    "read_file",
-    "read_stream",
-    "with_arguments",
-)
 
 _STREAM = "standard input"
 _FEW = 60
@@ -37,16 +27,16 @@ def read_arguments(words: Sequence[str]) -> list[Any]:
 
 def _read_argument(word: str, number: int) -> Any:
     try:
-        found = list(read_plain(word, "<value>")) if word else [""]
+        documents = list(read_plain(word, "<value>")) if word else [""]
     except YamlError as error:
         raise UsageError(
             f"value {number}, '{word:.{_FEW}}', is not YAML: {error.reason}"
         ) from error
-    if len(found) > 1:
+    if len(documents) > 1:
         raise UsageError(
-            f"value {number}, '{word:.{_FEW}}', is {len(found)} YAML documents; expected one"
+            f"value {number}, '{word:.{_FEW}}', is {len(documents)} YAML documents; expected one"
         )
-    return found[0] if found else None
+    return documents[0] if documents else None
 
 
 def read_file(path: Path) -> list[Any]:
@@ -66,7 +56,7 @@ def read_file(path: Path) -> list[Any]:
 def read_stream(lines: Iterable[bytes], warn: Callable[[str], None]) -> Iterator[Any]:
     """Yield the YAML documents of a stream, each as soon as a line of three dashes ends it.
 
-    What follows the last such line counts as unfinished and is skipped, as in ROS 1's tools.
+    The text after the last such line counts as unfinished and is skipped, as in ROS 1's tools.
 
     Args:
         lines: Lines of the stream.
@@ -82,11 +72,11 @@ def read_stream(lines: Iterable[bytes], warn: Callable[[str], None]) -> Iterator
             continue
         before = number - len(begun) - 1
         try:
-            found = list(_read(b"".join(begun), _STREAM))
+            documents = list(_read(b"".join(begun), _STREAM))
         except YamlError as error:
             raise YamlError(error.reason, _STREAM, before + error.line, error.column) from error
         begun.clear()
-        yield from found
+        yield from documents
     if b"".join(begun).strip():
         warn(f"{_STREAM} ends without a line '---': what comes after the last one is left out")
 
@@ -98,7 +88,7 @@ def _read(data: bytes, path: str) -> Iterator[Any]:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise YamlError(f"byte {data[error.start]:#04x} is not UTF-8", path, line) from error
-    yield from (one for one in read_plain(text, path) if one is not None)
+    yield from (document for document in read_plain(text, path) if document is not None)
 
 
 def make_message(cls: type[Any], arguments: Sequence[Any], now: int) -> Any:
@@ -114,7 +104,7 @@ def make_message(cls: type[Any], arguments: Sequence[Any], now: int) -> Any:
     """
     message = cls()
     fill_message_args(message, list(arguments), {"now": Time.from_nsec(now)})
-    cls._encode(message)  # raises for what does not fit before anything is sent
+    cls._encode(message)  # raises for a wrong value before anything is sent
     return message
 
 
@@ -133,13 +123,13 @@ def with_arguments(error: EncodeError, cls: type[Any]) -> EncodeError:
 
 
 def _arguments(cls: type[Any], prefix: str) -> list[str]:
-    found: list[str] = []
+    arguments: list[str] = []
     kinds = {slot.name: slot for slot in slots(cls)}
     for name in cls.__slots__:
         slot = kinds.get(name)
         kind = slot.kind if slot is not None and slot.shape == "one" else ""
         if isinstance(kind, type) and not issubclass(kind, TimeValue | DurationValue):
-            found += _arguments(kind, f"{prefix}{name}.")
+            arguments += _arguments(kind, f"{prefix}{name}.")
         else:
-            found.append(prefix + name)
-    return found
+            arguments.append(prefix + name)
+    return arguments

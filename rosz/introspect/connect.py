@@ -33,8 +33,6 @@ from rosz.session import (
 if TYPE_CHECKING:
     from rosz.node import Context
 
-__all__ = ("command_config", "find_unreached", "open_context", "open_session")
-
 T = TypeVar("T")
 
 _PEER_TIMEOUT = 0.5
@@ -111,19 +109,23 @@ def find_unreached(session: Session, environment: Environment) -> dict[str, str]
         Who was to connect to each endpoint, as "by laptop".
     """
     links = session.links()
-    found = {one.endpoint: f"by {one.host}" for one in find_waiting(session, _WAITING_TIMEOUT)}
+    unreached = {
+        waiting.endpoint: f"by {waiting.host}"
+        for waiting in find_waiting(session, _WAITING_TIMEOUT)
+    }
     dialled = environment.connect
     if environment.keys is not None:
         dialled = tuple(map(connect_endpoint, dialled))
     if not any(linked_session(endpoint, links) for endpoint in dialled):
-        found |= dict.fromkeys(environment.connect, "as ROSZ_CONNECT says")
-    return found
+        unreached |= dict.fromkeys(environment.connect, "as ROSZ_CONNECT says")
+    return unreached
 
 
 def command_config(environment: Environment, peers: LocalPeers | None = None) -> SessionConfig:
     """Return the configuration of the session of a short command.
 
-    Its time limit is longer if a process of rosz runs here, which will answer.
+    Its time limit is longer if a process of rosz runs here, which will answer, and for the answer
+    of another machine that accepts connections.
 
     Args:
         environment: Settings of this machine.
@@ -131,13 +133,19 @@ def command_config(environment: Environment, peers: LocalPeers | None = None) ->
     """
     peers = peers or LocalPeers.read(environment.rendezvous)
     awake = not _reaches_beyond(environment) and peers.is_any_running
-    return SessionConfig.command(environment, _BUSY_TIMEOUT if awake else _REPLY_TIMEOUT)
+    patient = awake or _depends_on_others(environment)
+    return SessionConfig.command(environment, _BUSY_TIMEOUT if patient else _REPLY_TIMEOUT)
 
 
 def _peer_config(environment: Environment) -> SessionConfig:
     # Without the registrations that Linux has, others must find the command at the rendezvous.
     hold = sys.platform != "linux"
     return msgspec.structs.replace(SessionConfig.node(environment), hold_rendezvous=hold)
+
+
+def _depends_on_others(environment: Environment) -> bool:
+    """Tell whether a command is a client of another machine, so that no peer could do without."""
+    return environment.mode == "client" and bool(environment.connect)
 
 
 def _reaches_beyond(environment: Environment) -> bool:
@@ -150,35 +158,29 @@ def _open_client(
     *,
     allowed: bool = True,
 ) -> T | None:
-    """Open a client of the process at the rendezvous; return None where a peer is needed.
-
-    Raises:
-        TransportError: All processes are stopped, or the one at the rendezvous does not answer.
-    """
+    """Open a client of the process at the rendezvous; return None where a peer is needed."""
     peers = LocalPeers.read(environment.rendezvous)
     beyond = _reaches_beyond(environment)
     if not beyond and not peers.has_peers and peers.why_unanswered:
         raise TransportError(peers.why_unanswered)
-    held = is_listening(environment.rendezvous)
+    occupied = is_listening(environment.rendezvous)
     if allowed and (
         beyond
         or environment.mode == "client"
-        or (held and not peers.is_router_stopped)
-        or (not held and peers.is_any_running)
+        or (occupied and not peers.is_router_stopped)
+        or (not occupied and peers.is_any_running)
     ):
         try:
             return open_client(command_config(environment, peers), peers)
         except TransportError as error:
             _check_free(environment, error)
+            if _depends_on_others(environment):
+                raise
     return None
 
 
 def _check_free(environment: Environment, error: TransportError) -> None:
-    """Check that a client failed to connect because the rendezvous is free.
-
-    Raises:
-        TransportError: A process listens there and does not answer, or a setting is not valid.
-    """
+    """Check that a client failed to connect because the rendezvous is free, or raise the reason."""
     places_of(SessionConfig.command(environment))
     stopped = LocalPeers.read(environment.rendezvous).why_unanswered
     if stopped:

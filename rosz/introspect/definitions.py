@@ -12,8 +12,6 @@ from rosz.idl import Catalog, MessageSpec, full_name, identity
 from rosz.names import short_type
 from rosz.typestore import Kind, TypeStore
 
-__all__ = ("Definitions", "TypeSummary")
-
 _PRIMITIVE_IN_ROS1 = {
     "builtin_interfaces/msg/Time": "time",
     "builtin_interfaces/msg/Duration": "duration",
@@ -70,12 +68,12 @@ class Definitions:
         if "::" in name or "." in name:
             raise UsageError(f"'{name}' is not a type; expected a form such as 'std_msgs/String'")
         if "/" not in name:
-            known = self._store.names(self._kind)
-            found = [one for one in known if one.rpartition("/")[2] == name]
-            if not found:
-                bases = {one.rpartition("/")[2] for one in known}
+            types = self._store.names(self._kind)
+            matching = [type_name for type_name in types if type_name.rpartition("/")[2] == name]
+            if not matching:
+                bases = {type_name.rpartition("/")[2] for type_name in types}
                 raise TypeNotFound(name, f"no package has it{near_miss(name, bases)}")
-            return [full_name(one, self._kind) for one in found]
+            return [full_name(type_name, self._kind) for type_name in matching]
         package, _, rest = name.partition("/")
         full = f"{package}/{self._kind}/{rest.removeprefix(f'{self._kind}/')}"
         try:
@@ -133,7 +131,9 @@ class Definitions:
             md5=md5,
             hash=type_hash,
             parts=[{field.name: _written(field.type) for field in part.fields} for part in parts],
-            constants=[{one.name: one.value for one in part.constants} for part in parts],
+            constants=[
+                {constant.name: constant.value for constant in part.constants} for part in parts
+            ],
             text=self.text(name),
         )
 

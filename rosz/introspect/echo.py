@@ -14,11 +14,8 @@ from typing import Any
 import msgspec
 
 from rosz.introspect.fields import FieldPath, Filter
-from rosz.message import Message
-from rosz.message.convert import to_jsonable
+from rosz.message import Message, strify_message, to_jsonable
 from rosz.time import DurationValue, TimeValue
-
-__all__ = ("Echo", "EchoOptions", "dump_bytes", "plot_columns", "plot_values", "shorten")
 
 _CLEAR = "\033[2J\033[;H"
 _DUMP_WIDTH = 16
@@ -77,7 +74,7 @@ class Echo:
         self._has_head = False
 
     def text(self, message: Any) -> str | None:
-        """Return what to print for a message; None if the filter refuses it.
+        """Return the text of a message to print; None if the filter refuses it.
 
         Raises:
             LookupError: The message has no element at an index of the path.
@@ -97,8 +94,6 @@ class Echo:
         return self._yaml(value)
 
     def _yaml(self, value: Any) -> str:
-        from rosz.message.text import strify_message
-
         offset = None
         if self._options.offset:
             from rosz.msgs.builtin_interfaces.msg import Time
@@ -138,7 +133,7 @@ class Echo:
 
 
 def shorten(value: Any, type_name: str, no_arrays: bool, no_strings: bool) -> Any:
-    """Return a value, with notes in place of what is left out.
+    """Return a value, with notes in place of the parts that are left out.
 
     Args:
         value: A message, or a value in it.
@@ -182,8 +177,8 @@ def plot_columns(value: Any, name: str, fields: FieldNames) -> Iterator[str]:
         for field, inner in _inner(value, fields):
             yield from plot_columns(inner, f"{name}.{field}", fields)
     elif isinstance(value, list | tuple | array):
-        for number, one in enumerate(value):
-            yield from plot_columns(one, f"{name}{number}", fields)
+        for number, item in enumerate(value):
+            yield from plot_columns(item, f"{name}{number}", fields)
     elif not isinstance(value, bytes):
         yield name
 
@@ -206,8 +201,8 @@ def plot_values(value: Any, offset: int, fields: FieldNames) -> Iterator[str]:
         for _, inner in _inner(value, fields):
             yield from plot_values(inner, offset, fields)
     elif isinstance(value, list | tuple | array):
-        for one in value:
-            yield from plot_values(one, offset, fields)
+        for item in value:
+            yield from plot_values(item, offset, fields)
     elif not isinstance(value, bytes):
         yield str(value)
 
@@ -219,7 +214,7 @@ def _inner(message: Message, fields: FieldNames) -> Iterator[tuple[str, Any]]:
         value = getattr(message, name)
         # Programs of ROS 1 may hold bytes as text.
         as_text = isinstance(value, str) and types.get(name, "").startswith("uint8[")
-        yield name, [ord(one) for one in value] if as_text else value
+        yield name, [ord(character) for character in value] if as_text else value
 
 
 def dump_bytes(data: bytes) -> str:

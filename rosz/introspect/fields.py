@@ -18,8 +18,6 @@ from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
 from rosz.message import Message, Slot, ros1_slots, slot_type, slots
 from rosz.names import short_type
 
-__all__ = ("FieldPath", "Filter", "FilterFailed", "Target", "find_target")
-
 _STEP = re.compile(r"(\w+)(?:\[([^\]]*)\])?")
 _MOST_SLICE_PARTS = 3
 _FEW = 100
@@ -62,7 +60,7 @@ class FieldPath:
 
         Raises:
             NotFoundError: The class has no such field.
-            UsageError: An index is given for what is not a sequence, or is missing for one.
+            UsageError: An index is given for a single value, or is missing for a sequence.
         """
         type_text = cls._type
         here: type[Any] | str = cls
@@ -125,7 +123,7 @@ def _follow(value: Any, steps: Sequence[_Step]) -> Any:
         if isinstance(step.index, slice):
             if not rest:
                 return list(value) if isinstance(value, bytes | array) else value
-            return [_follow(one, rest) for one in value]
+            return [_follow(item, rest) for item in value]
     return value
 
 
@@ -136,9 +134,9 @@ def _slot(cls: type[Any], name: str) -> Slot:
     other = ros1_slots(cls).get(name)
     if other is not None:
         return other
-    known = cls.__slots__
-    listing = f"; it has {', '.join(known)}" if known else "; it has no fields"
-    raise NotFoundError(f"'{cls._type}' has no field '{name}'{near_miss(name, known) or listing}")
+    fields = cls.__slots__
+    listing = f"; it has {', '.join(fields)}" if fields else "; it has no fields"
+    raise NotFoundError(f"'{cls._type}' has no field '{name}'{near_miss(name, fields) or listing}")
 
 
 class Target(msgspec.Struct, frozen=True):
@@ -155,7 +153,7 @@ class Target(msgspec.Struct, frozen=True):
     path: FieldPath
 
     def type_text(self, load: Loader) -> str:
-        """Return what ``rostopic type`` prints.
+        """Return the text of ``rostopic type``.
 
         Raises:
             RoszError: The path does not fit the type.
@@ -245,9 +243,9 @@ class Filter:
         Raises:
             FilterFailed: The expression fails on this message.
         """
-        known = {"m": message, "topic": topic}
+        names = {"m": message, "topic": topic}
         try:
-            return eval(self._code, known if time is None else {**known, "t": time})  # noqa: S307  # the user's
+            return eval(self._code, names if time is None else {**names, "t": time})  # noqa: S307  # the user's
         except Exception as error:
             raise FilterFailed(
                 f"filter '{self.text}' failed: {type(error).__name__}: {error}"

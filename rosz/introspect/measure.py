@@ -14,20 +14,6 @@ import msgspec
 
 from rosz.errors import DecodeError
 
-__all__ = (
-    "BandwidthMeter",
-    "BandwidthStats",
-    "DelayMeter",
-    "DelayStats",
-    "RateMeter",
-    "RateStats",
-    "format_bandwidth",
-    "format_delay",
-    "format_rate",
-    "format_rates",
-    "read_stamp",
-)
-
 _LONGEST_WINDOW = 50_000
 _BANDWIDTH_WINDOW = 100
 _SECOND = 1_000_000_000
@@ -145,10 +131,10 @@ class RateMeter(_TimeMeter):
 
     def stats(self) -> RateStats | None:
         """Return the rate; None if no message has arrived since the last call."""
-        found = self._summary()
-        if found is None:
+        summary = self._summary()
+        if summary is None:
             return None
-        return RateStats(1 / found[0] if found[0] > 0 else 0.0, *found[1:])
+        return RateStats(1 / summary[0] if summary[0] > 0 else 0.0, *summary[1:])
 
 
 class DelayMeter(_TimeMeter):
@@ -169,8 +155,8 @@ class DelayMeter(_TimeMeter):
 
     def stats(self) -> DelayStats | None:
         """Return the delay; None if no message has arrived since the last call."""
-        found = self._summary()
-        return None if found is None else DelayStats(*found)
+        summary = self._summary()
+        return None if summary is None else DelayStats(*summary)
 
 
 class BandwidthMeter:
@@ -229,15 +215,15 @@ def read_stamp(payload: bytes, type_name: str) -> int:
 
 
 def format_rate(stats: RateStats | None) -> str:
-    """Return what ``rostopic hz`` prints about one topic."""
+    """Return the text of ``rostopic hz`` for one topic."""
     return _format_times("rate", stats)
 
 
-def format_rates(found: Mapping[str, RateStats | None]) -> str:
+def format_rates(rates: Mapping[str, RateStats | None]) -> str:
     """Return the table that ``rostopic hz`` prints about several topics."""
     rows = [
         (name, *(f"{value:.4}" for value in msgspec.structs.astuple(s)[:-1]), str(s.window))
-        for name, s in found.items()
+        for name, s in rates.items()
         if s is not None
     ]
     if not rows:
@@ -249,7 +235,7 @@ def format_rates(found: Mapping[str, RateStats | None]) -> str:
 
 
 def format_delay(stats: DelayStats | None) -> str:
-    """Return what ``rostopic delay`` prints."""
+    """Return the text of ``rostopic delay``."""
     return _format_times("delay", stats)
 
 
@@ -264,7 +250,7 @@ def _format_times(what: str, stats: RateStats | DelayStats | None) -> str:
 
 
 def format_bandwidth(stats: BandwidthStats) -> str:
-    """Return what ``rostopic bw`` prints: all numbers in the unit that suits the first."""
+    """Return the text of ``rostopic bw``: all numbers in the unit that suits the first."""
     scale, unit = 1.0, "B"
     if stats.bytes_per_second >= _MEGA:
         scale, unit = _MEGA, "MB"

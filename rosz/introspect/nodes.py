@@ -21,24 +21,6 @@ if TYPE_CHECKING:
     from rosz.node import NodeInfo, Request
     from rosz.session import Session
 
-__all__ = (
-    "PING_TIMEOUT",
-    "NodeEntry",
-    "find_nodes",
-    "format_connections",
-    "format_node",
-    "get_info",
-    "get_levels",
-    "kill",
-    "kill_nodes",
-    "list_nodes",
-    "machines",
-    "nodes_on_machine",
-    "ping",
-    "query_node",
-    "set_level",
-)
-
 PING_TIMEOUT = 3.0
 """Seconds that a node has to answer a ping."""
 _KILL_TIMEOUT = 10.0
@@ -72,12 +54,12 @@ class NodeEntry(msgspec.Struct, frozen=True, omit_defaults=True):
 
 def list_nodes(survey: Survey) -> list[NodeEntry]:
     """Return an entry for each node, sorted by name."""
-    found: dict[tuple[str, int], NodeEntry] = {}
+    nodes: dict[tuple[str, int], NodeEntry] = {}
     for token in survey.view.tokens:
         process = survey.process(token)
-        known = () if process is None else (process.host, process.pid, process.started)
-        found[token.zid, token.node_id] = NodeEntry(token.node_name, token.zid, *known)
-    return sorted(found.values(), key=lambda node: (node.name, node.started, node.session))
+        details = () if process is None else (process.host, process.pid, process.started)
+        nodes[token.zid, token.node_id] = NodeEntry(token.node_name, token.zid, *details)
+    return sorted(nodes.values(), key=lambda node: (node.name, node.started, node.session))
 
 
 def machines(nodes: Iterable[NodeEntry]) -> list[str]:
@@ -91,14 +73,14 @@ def find_nodes(survey: Survey, name: str) -> list[Token]:
     Raises:
         NotFoundError: The node does not exist.
     """
-    found = survey.nodes_named(name)
-    if not found:
+    tokens = survey.nodes_named(name)
+    if not tokens:
         raise NotFoundError(f"unknown node '{name}'{near_miss(name, survey.view.nodes())}")
-    return found
+    return tokens
 
 
 def format_node(survey: Survey, node: Token) -> str:
-    """Return what ``rosnode info`` prints about a node from its tokens.
+    """Return the text of ``rosnode info`` about a node, from its tokens.
 
     Args:
         survey: The running nodes.
@@ -106,8 +88,8 @@ def format_node(survey: Survey, node: Token) -> str:
     """
     lines = [_RULE, f"Node [{node.node_name}]"]
     for title, kind in (("Publications", Kind.PUBLISHER), ("Subscriptions", Kind.SUBSCRIPTION)):
-        found = {(t.name, short_type(t.type_name)) for t in _entities(survey, node, kind)}
-        lines += _section(title, [f"{name} [{type_name}]" for name, type_name in sorted(found)])
+        topics = {(t.name, short_type(t.type_name)) for t in _entities(survey, node, kind)}
+        lines += _section(title, [f"{name} [{type_name}]" for name, type_name in sorted(topics)])
     served = {t.name for t in _entities(survey, node, Kind.SERVICE)}
     lines += _section("Services", sorted(served))
     return "\n".join(lines)
@@ -128,7 +110,7 @@ def _section(title: str, items: list[str]) -> list[str]:
 
 
 def format_connections(survey: Survey, node: Token) -> str:
-    """Return what ``rosnode info`` prints about the connections of a node.
+    """Return the text of ``rosnode info`` about the connections of a node.
 
     Args:
         survey: The running nodes.
@@ -156,22 +138,16 @@ def nodes_on_machine(nodes: Iterable[NodeEntry], machine: str) -> list[str]:
     Raises:
         NotFoundError: No node runs there.
     """
-    known = list(nodes)
-    found = sorted(node.name for node in known if node.host == machine)
-    if not found:
-        hosts = machines(known)
+    entries = list(nodes)
+    here = sorted(node.name for node in entries if node.host == machine)
+    if not here:
+        hosts = machines(entries)
         listing = f"; nodes run on {', '.join(hosts)}" if hosts else ""
         raise NotFoundError(f"no node runs on '{machine}'{near_miss(machine, hosts) or listing}")
-    return found
+    return here
 
 
-def query_node(
-    session: Session,
-    node: Token,
-    request: Request,
-    reply_type: type[T],
-    timeout: float = PING_TIMEOUT,
-) -> T:
+def query_node(session: Session, node: Token, request: Request, reply_type: type[T]) -> T:
     """Send a request to a rosz node and return its reply.
 
     Args:
@@ -179,7 +155,6 @@ def query_node(
         node: One of the node's tokens.
         request: The request.
         reply_type: Type of the reply.
-        timeout: Time limit in seconds.
 
     Raises:
         NotFoundError: Nothing replies: it is not a rosz node, or has just ended.
@@ -189,7 +164,7 @@ def query_node(
     from rosz.node import control_key
 
     key = control_key(node.domain, node.zid, node.node_id)
-    replies = session.get(key, payload=msgspec.msgpack.encode(request), timeout=timeout)
+    replies = session.get(key, payload=msgspec.msgpack.encode(request), timeout=PING_TIMEOUT)
     if not replies:
         raise NotFoundError(
             f"node '{node.node_name}' does not take requests: it is not a rosz node"
@@ -206,24 +181,23 @@ def query_node(
     text = reply.payload.decode(errors="replace")
     if text == "Timeout":
         why = session.why_silent(node.zid) or "it hangs or is stopped"
-        raise WaitTimeout(f"answer of node '{node.node_name}'", timeout, why)
+        raise WaitTimeout(f"answer of node '{node.node_name}'", PING_TIMEOUT, why)
     raise RoszError(text)
 
 
-def get_info(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> NodeInfo:
+def get_info(session: Session, node: Token) -> NodeInfo:
     """Return the information that a node gives of itself; errors as those of `query_node`."""
     from rosz.node import NodeInfo, Request
 
-    return query_node(session, node, Request("info"), NodeInfo, timeout)
+    return query_node(session, node, Request("info"), NodeInfo)
 
 
-def ping(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> float:
+def ping(session: Session, node: Token) -> float:
     """Return how many seconds a node takes to reply.
 
     Args:
         session: The session to send the request on.
         node: One of the node's tokens.
-        timeout: Time limit in seconds.
 
     Raises:
         NotFoundError: The node has ended, or is not a rosz node.
@@ -232,7 +206,7 @@ def ping(session: Session, node: Token, timeout: float = PING_TIMEOUT) -> float:
     """
     began = time.perf_counter()
     try:
-        get_info(session, node, timeout)
+        get_info(session, node)
     except NotFoundError as error:
         if take_survey(session, node.domain).nodes_named(node.node_name):
             raise

@@ -13,8 +13,6 @@ from rosz.introspect.arguments import make_message
 if TYPE_CHECKING:
     from rosz.node import Node, Publisher
 
-__all__ = ("DEFAULT_RATE", "ONCE_SECONDS", "SendOptions", "Sender")
-
 ONCE_SECONDS = 3.0
 """Seconds that a message that is sent once stays latched for late joiners."""
 DEFAULT_RATE = 10.0
@@ -69,7 +67,7 @@ class Sender:
         """
         if self._options.rate is None:
             self._latch(arguments, once=self._options.once)
-            self._stay(ONCE_SECONDS if self._options.once else None)
+            self._node.context.wait_for_shutdown(ONCE_SECONDS if self._options.once else None)
         else:
             self._repeat(arguments, self._options.rate)
 
@@ -101,7 +99,9 @@ class Sender:
                 break
             pace.sleep()
         if sent:
-            self._stay(ONCE_SECONDS if pace is not None or self._options.once else None)
+            self._node.context.wait_for_shutdown(
+                ONCE_SECONDS if pace is not None or self._options.once else None
+            )
 
     def _make(self, arguments: Sequence[Any]) -> Any:
         now = self._node.now() if self._options.ros_time else time.time_ns()
@@ -113,9 +113,6 @@ class Sender:
         end = f" for {ONCE_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
         self._report(f"publishing and latching {shown}{end}")
         self._publisher.publish(message)
-
-    def _stay(self, seconds: float | None) -> None:
-        self._node.context.wait_for_shutdown(seconds)
 
     def _repeat(self, arguments: Sequence[Any], rate: float) -> None:
         message = self._make(arguments)

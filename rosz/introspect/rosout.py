@@ -11,8 +11,6 @@ from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.node import parse_severity, severity_name
 
-__all__ = ("LogFilter", "LogLine", "format_line", "read_line", "ros1_node")
-
 _COLORS = {"DEBUG": "\033[32m", "WARN": "\033[33m", "ERROR": "\033[31m", "FATAL": "\033[31m"}
 _RESET = "\033[0m"
 
@@ -91,11 +89,10 @@ class LogFilter:
         """Return whether a line passes."""
         if parse_severity(line.level) < self._level or not self._pattern.search(line.text):
             return False
-        return not self._nodes or any(_belongs(line.node, node) for node in self._nodes)
-
-
-def _belongs(name: str, node: str) -> bool:
-    return name == node or name.startswith((f"{node}.", f"{node.rstrip('/')}/"))
+        return not self._nodes or any(
+            line.node == node or line.node.startswith((f"{node}.", f"{node.rstrip('/')}/"))
+            for node in self._nodes
+        )
 
 
 def format_line(line: LogLine, *, color: bool = False, verbose: bool = False) -> str:

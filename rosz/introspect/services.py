@@ -16,16 +16,6 @@ if TYPE_CHECKING:
     from rosz.graph import View
     from rosz.node import Client, Context
 
-__all__ = (
-    "ServiceEntry",
-    "call_service",
-    "find_server",
-    "list_services",
-    "service_key",
-    "services_of_type",
-    "wait_for_server",
-)
-
 
 class ServiceEntry(msgspec.Struct, frozen=True):
     """A service.

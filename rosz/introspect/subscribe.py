@@ -4,29 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from rosz import names
 from rosz.errors import DefinitionError, InvalidName, NotFoundError
+from rosz.graph import View
 from rosz.introspect.fields import Target, find_target
-from rosz.node import Entity
+from rosz.message import Message
+from rosz.node import Context, Entity, Node
 from rosz.qos import DEFAULT
+from rosz.session import Sample
 from rosz.wire import NO_HASH, Kind, Token, entity_key
-
-if TYPE_CHECKING:
-    from rosz.graph import View
-    from rosz.message import Message
-    from rosz.node import Context, Node
-    from rosz.session import Sample
-
-__all__ = (
-    "find_class",
-    "find_token",
-    "resolve_field",
-    "subscribe_samples",
-    "topic_types",
-    "wait_for_target",
-)
 
 
 def resolve_field(name: str, resolve: Callable[[str], str]) -> str:
@@ -47,28 +34,20 @@ def resolve_field(name: str, resolve: Callable[[str], str]) -> str:
 
 def topic_types(view: View) -> Mapping[str, Sequence[str]]:
     """Return the types of all topics, those of publishers before those of subscriptions."""
-    found: dict[str, Sequence[str]] = {}
+    all_types: dict[str, Sequence[str]] = {}
     for name, types in view.topics().items():
         published = sorted({token.type_name for token in view.publishers(name)})
-        found[name] = [*published, *(each for each in types if each not in published)]
-    return found
+        all_types[name] = [*published, *(each for each in types if each not in published)]
+    return all_types
 
 
 def wait_for_target(
     context: Context, name: str, warn: Callable[[str], object]
 ) -> tuple[Target, Token]:
-    """Return the topic, or the topic and the field, of a name; wait while there is none.
+    """Return the topic or the field of a name, and a token of the topic; wait while there is none.
 
-    Args:
-        context: The context whose graph is watched.
-        name: Global name, fields and indices included.
-        warn: Function called with a sentence if it has to wait.
-
-    Returns:
-        The topic or the field, and a token of the topic.
-
-    Raises:
-        ClosedError: The context is shut down meanwhile.
+    The arguments and errors are those of `rosz.introspect.services.wait_for_server`; the name is
+    global, fields and indices included.
     """
     load = context.types.message
 
@@ -80,17 +59,17 @@ def wait_for_target(
         return context.graph.find(find)
     except NotFoundError as error:
         warn(f"topic [{name}] does not appear to be published yet ({error})")
-    found: list[tuple[Target, Token]] = []
+    targets: list[tuple[Target, Token]] = []
 
     def look(view: View) -> bool:
         try:
-            found.append(find(view))
+            targets.append(find(view))
         except NotFoundError:
             return False
         return True
 
     context.graph.wait_for(look, threading.TIMEOUT_MAX / 2, f"topic '{name}'")
-    return found[-1]
+    return targets[-1]
 
 
 def find_token(view: View, topic: str, type_name: str) -> Token:

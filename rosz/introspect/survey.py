@@ -20,8 +20,6 @@ from rosz.wire import (
     tokens_key,
 )
 
-__all__ = ("Survey", "process_address", "take_survey")
-
 T = TypeVar("T")
 _REPLY_TIMEOUT = 2.0
 """Seconds that a process that is stopped may delay a survey."""
@@ -31,7 +29,7 @@ _DROPPED_TIMEOUT = 1.0
 
 
 class Survey(msgspec.Struct, frozen=True):
-    """The nodes of a domain and what they declare.
+    """The nodes of a domain and their entities.
 
     Attributes:
         domain: The ROS domain.
@@ -63,8 +61,8 @@ class Survey(msgspec.Struct, frozen=True):
 
     def nodes_named(self, name: str) -> list[Token]:
         """Return one token for each node of a full name."""
-        found = {(t.zid, t.node_id): t for t in self.view.tokens if t.node_name == name}
-        return [found[key] for key in sorted(found)]
+        tokens = {(t.zid, t.node_id): t for t in self.view.tokens if t.node_name == name}
+        return [tokens[key] for key in sorted(tokens)]
 
 
 def process_address(process: ProcessToken) -> str:
@@ -79,6 +77,7 @@ def take_survey(
     nodes: Collection[str] = (),
     processes: bool = False,
     dropped: bool = False,
+    timeout: float = _REPLY_TIMEOUT,
 ) -> Survey:
     """Query the network for the nodes of a domain.
 
@@ -88,24 +87,28 @@ def take_survey(
         nodes: Full names to look for longer if they are not found at once.
         processes: Whether to query processes as well.
         dropped: Whether to query the counts of dropped samples as well.
+        timeout: Seconds to wait for tokens, of which those that came by then count.
 
     Raises:
         ClosedError: The session is closed.
         WaitTimeout: The replies do not end in time.
     """
     damaged: list[str] = []
-    keys = session.live_tokens(tokens_key(domain), _REPLY_TIMEOUT)
+    keys = session.live_tokens(tokens_key(domain), timeout)
     tokens = list(_read(keys, parse_token, damaged))
     if nodes and not {token.node_name for token in tokens}.issuperset(nodes):
         damaged.clear()
         keys = session.live_tokens(tokens_key(domain), _SEARCH_TIMEOUT)
         tokens = list(_read(keys, parse_token, damaged))
-    found: dict[tuple[str, int], ProcessToken] = {}
+    by_node: dict[tuple[str, int], ProcessToken] = {}
     if processes:
-        keys = session.live_tokens(processes_key(domain), _REPLY_TIMEOUT)
-        found = {(one.zid, one.node_id): one for one in _read(keys, parse_process, damaged)}
+        keys = session.live_tokens(processes_key(domain), timeout)
+        by_node = {
+            (process.zid, process.node_id): process
+            for process in _read(keys, parse_process, damaged)
+        }
     counts = dict(_read_dropped(session, domain, damaged)) if dropped else {}
-    return Survey(domain, View(tokens), found, tuple(damaged), counts)
+    return Survey(domain, View(tokens), by_node, tuple(damaged), counts)
 
 
 def _read_dropped(

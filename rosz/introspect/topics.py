@@ -11,18 +11,6 @@ from rosz.introspect.survey import Survey
 from rosz.names import is_of_action, short_type
 from rosz.wire import Kind, Token
 
-__all__ = (
-    "Topic",
-    "by_host",
-    "entity_row",
-    "find_topic",
-    "format_topic",
-    "format_topics",
-    "in_namespace",
-    "list_topics",
-    "topics_of_type",
-)
-
 
 class Topic(msgspec.Struct, frozen=True):
     """A topic.
@@ -47,17 +35,17 @@ class Topic(msgspec.Struct, frozen=True):
 
 def list_topics(tokens: Iterable[Token]) -> list[Topic]:
     """Return the topics of some tokens, sorted by name; those of actions of ROS 2 are left out."""
-    found: dict[str, tuple[set[str], list[str], list[str]]] = {}
+    topics: dict[str, tuple[set[str], list[str], list[str]]] = {}
     for token in tokens:
         if token.kind not in {Kind.PUBLISHER, Kind.SUBSCRIPTION} or is_of_action(token.name):
             continue
-        types, publishers, subscribers = found.setdefault(token.name, (set(), [], []))
+        types, publishers, subscribers = topics.setdefault(token.name, (set(), [], []))
         types.add(short_type(token.type_name))
         side = publishers if token.kind is Kind.PUBLISHER else subscribers
         side.append(token.node_name)
     return [
         Topic(name, tuple(sorted(types)), tuple(sorted(pubs)), tuple(sorted(subs)))
-        for name, (types, pubs, subs) in sorted(found.items())
+        for name, (types, pubs, subs) in sorted(topics.items())
     ]
 
 
@@ -68,10 +56,10 @@ def in_namespace(name: str, namespace: str) -> bool:
 
 def by_host(survey: Survey) -> dict[str, list[Token]]:
     """Return the tokens of the nodes of each host, by host name."""
-    found: dict[str, list[Token]] = {}
+    hosts: dict[str, list[Token]] = {}
     for token in survey.view.tokens:
-        found.setdefault(survey.host(token), []).append(token)
-    return dict(sorted(found.items()))
+        hosts.setdefault(survey.host(token), []).append(token)
+    return dict(sorted(hosts.items()))
 
 
 def topics_of_type(topics: Iterable[Topic], type_name: str) -> list[str]:
@@ -83,7 +71,7 @@ def topics_of_type(topics: Iterable[Topic], type_name: str) -> list[str]:
 def format_topics(
     topics: Iterable[Topic], *, publishers: bool = True, subscribers: bool = True, indent: str = ""
 ) -> str:
-    """Return what ``rostopic list -v`` prints.
+    """Return the text of ``rostopic list -v``.
 
     Args:
         topics: The topics.
@@ -91,17 +79,17 @@ def format_topics(
         subscribers: Whether to list subscribed topics.
         indent: Beginning of every line.
     """
-    known = list(topics)
+    listing = list(topics)
     lines: list[str] = []
     if publishers:
         lines += ["", f"{indent}Published topics:"]
         lines += (
-            _counted(indent, t, len(t.publishers), "publisher") for t in known if t.publishers
+            _counted(indent, t, len(t.publishers), "publisher") for t in listing if t.publishers
         )
     if subscribers:
         lines += [indent, f"{indent}Subscribed topics:"]
         lines += (
-            _counted(indent, t, len(t.subscribers), "subscriber") for t in known if t.subscribers
+            _counted(indent, t, len(t.subscribers), "subscriber") for t in listing if t.subscribers
         )
     return "\n".join([*lines, "", ""])
 
@@ -124,7 +112,7 @@ def find_topic(survey: Survey, name: str) -> tuple[Topic, list[Token], list[Toke
 
 
 def format_topic(survey: Survey, name: str) -> str:
-    """Return what ``rostopic info`` prints about a topic.
+    """Return the text of ``rostopic info`` about a topic.
 
     Raises:
         NotFoundError: No node publishes it or subscribes to it.

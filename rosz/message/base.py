@@ -24,20 +24,6 @@ import msgspec
 
 from rosz.message.schema import SEQ, Schema, Slot, rclpy_type, slot_type, slots
 
-__all__ = (
-    "Action",
-    "Array",
-    "Bytes",
-    "Derived",
-    "Message",
-    "Renamed",
-    "Sequenced",
-    "Service",
-    "Stamped",
-    "Writable",
-    "ros1_slots",
-)
-
 _T = TypeVar("_T")
 
 _RULE = "=" * 80
@@ -77,11 +63,7 @@ class _Derived(Generic[_T]):
 
 
 class _Ros1Codec:
-    """A function of ROS 1's codec, compiled for a class when it is asked for first.
-
-    Args:
-        maker: Name of the function in `rosz.message.ros1_codec` that compiles it.
-    """
+    """A function of ROS 1's codec, compiled for a class when it is asked for first."""
 
     def __init__(self, maker: str) -> None:
         self._maker = maker
@@ -120,14 +102,14 @@ def _full_text(cls: type[Message | Service]) -> str:
 def _below(cls: type[Message | Service]) -> list[type[Message]]:
     """Return the message types in a definition, each once, in genmsg's order."""
     tops = (cls.Request, cls.Response) if issubclass(cls, Service) else (cls,)
-    found: dict[type[Message], None] = {}
+    classes: dict[type[Message], None] = {}
     rest = [kind for top in tops for _, kind, _ in top._schema if isinstance(kind, type)]
     while rest:
         kind = rest.pop(0)
-        if kind not in found:
-            found[kind] = None
+        if kind not in classes:
+            classes[kind] = None
             rest[:0] = [below for _, below, _ in kind._schema if isinstance(below, type)]
-    return list(found)
+    return list(classes)
 
 
 class _TakesRos1Names(msgspec.StructMeta):
@@ -195,7 +177,7 @@ def _made(cls: Any, values: dict[str, Any]) -> Any:
 
 
 def _initialize(self: Any, *args: Any, **members: Any) -> None:
-    """Set fields by position or name; what a derived class calls as ``Base.__init__``."""
+    """Set fields by position or name; derived classes call it as ``Base.__init__``."""
     names = self.__struct_fields__
     if len(args) > len(names):
         raise TypeError(f"expected at most {len(names)} values, got {len(args)}")
@@ -203,10 +185,6 @@ def _initialize(self: Any, *args: Any, **members: Any) -> None:
     for name, value in given.items():
         if value is not None:
             setattr(self, name, value)
-
-
-def _has_sequences(kind: Any) -> bool:
-    return getattr(kind, "__eq__", None) is _equal
 
 
 def _equal(self: Any, other: Any) -> Any:
@@ -272,7 +250,8 @@ class Message(msgspec.Struct, gc=False):
 
     def __init_subclass__(cls, **_options: object) -> None:
         cls.__slots__ = [name for name, _, _ in cls._schema]
-        if any(suffix or _has_sequences(kind) for _, kind, suffix in vars(cls).get("_schema", ())):
+        members = vars(cls).get("_schema", ())
+        if any(suffix or getattr(kind, "__eq__", None) is _equal for _, kind, suffix in members):
             setattr(cls, "__eq__", _equal)  # noqa: B010  # mypy refuses an assignment
             setattr(cls, "__ne__", _unequal)  # noqa: B010
 
@@ -347,9 +326,9 @@ class Message(msgspec.Struct, gc=False):
         Raises:
             DecodeError: The bytes are not a message of this type.
         """
-        from rosz.message.tuples import ros1_decoder
+        from rosz.message.tuples import ros1_tuple_decoder
 
-        other = ros1_decoder(type(self))(bytes(data or b""))
+        other = ros1_tuple_decoder(type(self))(bytes(data or b""))
         for name in self.__struct_fields__:
             setattr(self, name, getattr(other, name))
         return self
@@ -398,8 +377,8 @@ class Sequenced(Message):
 
 def ros1_slots(cls: Any) -> dict[str, Slot]:
     """Return the fields of a message class that have another name in ROS 1, or are only there."""
-    found = {slot.name: slot for slot in slots(cls)}
-    renamed = {old: found[new] for old, new in cls._ros1_names.items()}
+    own = {slot.name: slot for slot in slots(cls)}
+    renamed = {old: own[new] for old, new in cls._ros1_names.items()}
     return {**renamed, "seq": SEQ} if issubclass(cls, Sequenced) else renamed
 
 
@@ -411,7 +390,7 @@ class Stamped(Message):
     """
 
     def __post_init__(self) -> None:
-        """Set what is None to the default if the header is."""
+        """Set fields that are None to their defaults if the header is None."""
         message: Any = self
         if message.header is None:
             default = msgspec.StructMeta.__call__(type(self))
@@ -422,6 +401,31 @@ class Stamped(Message):
 
 class Renamed(Stamped, metaclass=_TakesRos1Names):
     """A message whose constructor takes ROS 1's names of fields, such as ``CameraInfo(K=…)``."""
+
+
+class Ros2Default:
+    """Makes the default of a field that ROS 1 has with zero, such as ``Quaternion.w``.
+
+    Args:
+        value: Default in ROS 2.
+
+    Attributes:
+        ros1: Whether ROS 1's defaults hold in this process; constructors take nothing that could
+            tell. What makes ROS 1's names importable sets it.
+    """
+
+    ros1: ClassVar[bool] = False
+
+    def __init__(self, value: float) -> None:
+        self._value = value
+        self._zero = type(value)(0)
+
+    def __repr__(self) -> str:
+        return f"Ros2Default({self._value})"
+
+    def __call__(self) -> Any:
+        """Return the default."""
+        return self._zero if Ros2Default.ros1 else self._value
 
 
 class Service:

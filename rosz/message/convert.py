@@ -14,7 +14,7 @@ import keyword
 import math
 from array import array
 from collections.abc import Callable, Mapping
-from typing import Any, NoReturn, TypeAlias, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 import yaml
 
@@ -25,19 +25,6 @@ from rosz.message.schema_codec import shown
 from rosz.message.sequences import numbers
 from rosz.message.text import strify_message
 from rosz.time import DurationValue, TimeValue, normal
-
-__all__ = (
-    "Now",
-    "fill_message_args",
-    "from_json",
-    "from_plain",
-    "from_yaml",
-    "shown_name",
-    "to_json",
-    "to_jsonable",
-    "to_plain",
-    "to_yaml",
-)
 
 _NOT_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 _FLOATS = frozenset({"float32", "float64"})
@@ -73,35 +60,32 @@ def shown_name(name: str) -> str:
     return bare if keyword.iskeyword(bare) else name
 
 
-class _Filler:
+class _Filler(NamedTuple):
     """Sets fields of one message, and names the field where a value does not fit."""
 
-    def __init__(
-        self, type_name: str, keys: Mapping[str, Any], *, null_is_nan: bool = False
-    ) -> None:
-        self._type = type_name
-        self._keys = keys
-        self._null_is_nan = null_is_nan
+    type_name: str
+    keys: Mapping[str, Any]
+    null_is_nan: bool = False
 
     def _refuse(self, path: str, expected: str, value: Any) -> NoReturn:
         given = shown(value) if value is not None else "nothing"
-        raise EncodeError(self._type, path, f"expected {expected}, got {given}")
+        raise EncodeError(self.type_name, path, f"expected {expected}, got {given}")
 
     def fill(self, message: Message, value: Any, path: str) -> None:
         """Set the fields of a message from a dict or a list."""
         cls = type(message)
         prefix = f"{path}." if path else ""
         if isinstance(value, dict):
-            for name, one in value.items():
+            for name, given in value.items():
                 slot = self._slot(cls, name, path)
-                member = "" if one is None and slot.kind in _TEXTS else one
+                member = "" if given is None and slot.kind in _TEXTS else given
                 setattr(message, slot.name, self._value(slot, member, f"{prefix}{name}", message))
             return
         if not isinstance(value, list | tuple):
             self._refuse(path, f"{cls._type} as a dict or a list", value)
         fields = self._positional(cls, len(value), path)
-        for slot, one in zip(fields, value, strict=True):
-            setattr(message, slot.name, self._value(slot, one, prefix + slot.name, message))
+        for slot, given in zip(fields, value, strict=True):
+            setattr(message, slot.name, self._value(slot, given, prefix + slot.name, message))
 
     def _positional(self, cls: type[Message], count: int, path: str) -> list[Slot]:
         fields = list(slots(cls))
@@ -112,17 +96,20 @@ class _Filler:
             values = {0: "no values", 1: "1 value"}.get(len(fields), f"{len(fields)} values")
             owner = f"of {cls._type} " if path else ""
             what = f"{values} for the fields {owner}({names})" if fields else values
-            raise EncodeError(self._type, path, f"expected {what}, got {count}")
+            raise EncodeError(self.type_name, path, f"expected {what}, got {count}")
         return fields
 
     def _slot(self, cls: type[Message], name: Any, path: str) -> Slot:
-        known = {shown_name(slot.name): slot for slot in slots(cls)}
-        known |= ros1_slots(cls)
-        if name in known:
-            return known[name]
-        fields = near_miss(str(name), known) or f"; it has {', '.join(known) or 'no fields'}"
+        fields_by_name = {shown_name(slot.name): slot for slot in slots(cls)}
+        fields_by_name |= ros1_slots(cls)
+        if name in fields_by_name:
+            return fields_by_name[name]
+        fields = (
+            near_miss(str(name), fields_by_name)
+            or f"; it has {', '.join(fields_by_name) or 'no fields'}"
+        )
         owner = cls._type if path else "it"
-        raise EncodeError(self._type, path, f"{owner} has no field '{name}'{fields}")
+        raise EncodeError(self.type_name, path, f"{owner} has no field '{name}'{fields}")
 
     def _value(self, slot: Slot, value: Any, path: str, owner: Message) -> Any:
         if slot.shape == "one":
@@ -145,7 +132,7 @@ class _Filler:
         if isinstance(slot.kind, str) and slot.kind in OCTETS and isinstance(value, bytes):
             return value
         elements = [
-            self._one(slot, one, f"{path}[{index}]", None) for index, one in enumerate(value)
+            self._one(slot, item, f"{path}[{index}]", None) for index, item in enumerate(value)
         ]
         if isinstance(slot.kind, str):
             if slot.kind in OCTETS:
@@ -193,7 +180,7 @@ class _Filler:
                 return _NOT_FINITE[value] if value in _NOT_FINITE else float(value)
             except ValueError:
                 self._refuse(path, kind, value)
-        if value is None and self._null_is_nan:
+        if value is None and self.null_is_nan:
             return math.nan
         if isinstance(value, bool) or not hasattr(value, "__float__"):
             self._refuse(path, kind, value)
@@ -217,7 +204,7 @@ class _Filler:
 
     def _named(self, cls: Any, name: str, path: str) -> Message:
         """Return the message that a name stands for."""
-        now = self._keys.get("now")
+        now = self.keys.get("now")
         if name == "now" and now is not None and issubclass(cls, TimeValue):
             return self._time(cls, now)
         if name == "auto" and now is not None and issubclass(cls, Sequenced):
@@ -225,10 +212,10 @@ class _Filler:
             stamp: Any = header
             stamp.stamp = self._time(type(stamp.stamp), now)
             return header
-        value = self._keys.get(name)
+        value = self.keys.get(name)
         if not isinstance(value, Message):
-            known = sorted({*self._keys, *(("auto",) if now is not None else ())})
-            choice = f" or one of {', '.join(known)}" if known else ""
+            names = sorted({*self.keys, *(("auto",) if now is not None else ())})
+            choice = f" or one of {', '.join(names)}" if names else ""
             self._refuse(path, cls._type + choice, name)
         return value
 
@@ -271,13 +258,13 @@ def to_jsonable(value: Any) -> Any:
     if hasattr(value, "_schema"):
         value = {shown_name(name): getattr(value, name) for name in type(value).__slots__}
     if isinstance(value, dict):
-        return {name: to_jsonable(one) for name, one in value.items()}
+        return {name: to_jsonable(element) for name, element in value.items()}
     if isinstance(value, bytes | bytearray):
         return base64.b64encode(value).decode()
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return [to_jsonable(one) for one in value]
+        return [to_jsonable(element) for element in value]
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     return value
@@ -347,5 +334,5 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(element) for element in value]
     return value

@@ -8,20 +8,6 @@ from typing import Any, Literal, TypeAlias
 
 import msgspec
 
-__all__ = (
-    "ARRAY_CODES",
-    "INTEGER_RANGES",
-    "OCTETS",
-    "SCALAR_CODES",
-    "SCALAR_SIZES",
-    "SEQ",
-    "Schema",
-    "Slot",
-    "rclpy_type",
-    "slot_type",
-    "slots",
-)
-
 Schema: TypeAlias = tuple[tuple[str, "str | type[Any]", str], ...]
 """Fields as (attribute, type, array suffix): a primitive such as ``string<=8`` or a message class,
 and ``""``, ``"[]"``, ``"[36]"`` or ``"[<=3]"``."""

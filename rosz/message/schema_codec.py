@@ -1,7 +1,7 @@
 """The slow codec, which follows a class's schema field by field.
 
 Generated code falls back on it for values that are valid but unusual, for big-endian bytes, and for
-an error that says what is wrong and where.
+an error that names the wrong value and its place.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from array import array
 from typing import Any, NoReturn, TypeVar
 
 from rosz.errors import DecodeError, EncodeError
-from rosz.message.ros1_layout import ros1_fields
+from rosz.message.layout import CDR, ROS1, ByteLayout
 from rosz.message.schema import (
     ARRAY_CODES,
     INTEGER_RANGES,
@@ -20,7 +20,6 @@ from rosz.message.schema import (
     SCALAR_CODES,
     SCALAR_SIZES,
     Slot,
-    slots,
 )
 from rosz.message.sequences import (
     TRUTH,
@@ -28,22 +27,11 @@ from rosz.message.sequences import (
     numbers,
     octets,
     pack_wide,
-    put_text,
     read_wide,
-)
-
-__all__ = (
-    "FAULTS",
-    "decode_plainly",
-    "decode_plainly_ros1",
-    "encode_plainly",
-    "encode_plainly_ros1",
-    "shown",
 )
 
 _T = TypeVar("_T")
 
-_HEADER = b"\0\1\0\0"
 _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
 _BYTES = frozenset({"byte", "char"})
 _FEW = 60
@@ -60,58 +48,40 @@ FAULTS = (
 """Exceptions that wrong values and damaged bytes raise in generated code, and in this one."""
 
 
-def encode_plainly(message: Any, cls: type[Any]) -> bytes:
-    """Return a message as CDR, or raise an error that says what is wrong with it.
+def encode_plainly(message: Any, cls: type[Any], layout: ByteLayout = CDR) -> bytes:
+    """Return the bytes of a message, or raise an error that names the wrong value.
 
     Args:
         message: The message.
         cls: The message class whose schema it must fit.
+        layout: The byte layout.
 
     Raises:
         EncodeError: A value does not fit.
     """
-    writer = _Writer(cls._type)
+    writer = _PlainWriter(cls._type, layout)
     writer.message(message, cls, "")
-    return _HEADER + writer.data
+    return layout.header + writer.data
 
 
-def decode_plainly(data: bytes, cls: type[_T]) -> _T:
-    """Return the message in CDR bytes of either byte order.
+def decode_plainly(data: bytes, cls: type[_T], layout: ByteLayout = CDR) -> _T:
+    """Return the message in bytes; those of CDR may be of either byte order.
 
     Raises:
         DecodeError: The bytes are not a message of that class.
     """
     type_name: str = cls._type  # type: ignore[attr-defined]
-    order = _ORDERS.get(data[:2])
-    if len(data) < len(_HEADER):
-        raise DecodeError(type_name, 0, f"expected a header of 4 bytes, got {len(data)}") from None
+    size = len(layout.header)
+    order = _ORDERS.get(data[:2]) if size else "<"
+    if len(data) < size:
+        raise DecodeError(
+            type_name, 0, f"expected a header of {size} bytes, got {len(data)}"
+        ) from None
     if order is None:
         raise DecodeError(
             type_name, 0, f"expected encapsulation 0x0000 or 0x0001 (CDR), got 0x{data[:2].hex()}"
         ) from None
-    message: _T = _Reader(type_name, data, order).message(cls, "")
-    return message
-
-
-def encode_plainly_ros1(message: Any, cls: type[Any]) -> bytes:
-    """Return a message in ROS 1's layout, or raise an error that says what is wrong with it.
-
-    Raises:
-        EncodeError: A value does not fit.
-    """
-    writer = _Ros1Writer(cls._type)
-    writer.message(message, cls, "")
-    return bytes(writer.data)
-
-
-def decode_plainly_ros1(data: bytes, cls: type[_T]) -> _T:
-    """Return the message in the bytes of ROS 1's layout.
-
-    Raises:
-        DecodeError: The bytes are not a message of that class.
-    """
-    type_name: str = cls._type  # type: ignore[attr-defined]
-    message: _T = _Ros1Reader(type_name, data).message(cls, "")
+    message: _T = _PlainReader(type_name, data, order, layout).message(cls, "")
     return message
 
 
@@ -121,15 +91,12 @@ def shown(value: object) -> str:
     return f"{type(value).__name__} {text if len(text) <= _FEW else text[: _FEW - 1] + '…'}"
 
 
-class _Writer:
+class _PlainWriter:
     """The encoded bytes; alignment counts from the first byte after the header."""
 
-    _fields = staticmethod(slots)
-    _text_bytes = staticmethod(put_text)
-    _zeros = 1  # behind a string
-
-    def __init__(self, type_name: str) -> None:
+    def __init__(self, type_name: str, layout: ByteLayout) -> None:
         self._type = type_name
+        self._layout = layout
         self.data = bytearray()
 
     def _refuse(self, path: str, expected: str, value: object, why: str = "") -> NoReturn:
@@ -142,10 +109,10 @@ class _Writer:
         self.data += packed
 
     def _align(self, size: int) -> None:
-        self.data += bytes(-len(self.data) % size)
+        self.data += bytes(-len(self.data) % self._layout.limit(size))
 
     def message(self, value: Any, cls: Any, path: str) -> None:
-        fields = self._fields(cls)
+        fields = self._layout.fields(cls)
         for slot in fields:
             name = f"{path}.{slot.name}" if path else slot.name
             try:
@@ -154,10 +121,7 @@ class _Writer:
                 self._refuse(path, cls._type, value, f"it has no field '{slot.name}'")
             self._field(slot, member, name)
         if not fields:
-            self._end_of_empty()
-
-    def _end_of_empty(self) -> None:
-        self.data += b"\0"
+            self.data += bytes(self._layout.empty)
 
     def _field(self, slot: Slot, value: Any, path: str) -> None:
         if slot.shape == "one":
@@ -181,15 +145,17 @@ class _Writer:
 
     def _text(self, slot: Slot, value: Any, path: str) -> None:
         wide = slot.kind == "wstring"
+        if wide and self._layout is ROS1:
+            self._refuse(path, "a type that ROS 1 has, which has no wstring", value)
         try:
             given = value.decode() if isinstance(value, bytes | bytearray) and not wide else value
-            packed = pack_wide(given) if wide else self._text_bytes(given)
+            packed = pack_wide(given) if wide else self._layout.encode(given)
         except AttributeError:
             self._refuse(path, str(slot.kind), value)
         except ValueError as error:
             self._refuse(path, str(slot.kind), value, str(error))
         length = len(packed) // 4 if wide else len(packed)
-        if slot.bound and length - (not wide) * self._zeros > slot.bound:
+        if slot.bound and length - (not wide) * self._layout.zeros > slot.bound:
             units = "code units" if wide else "bytes of UTF-8"
             self._refuse(path, f"at most {slot.bound} {units}", value)
         self._put("I", length)
@@ -248,40 +214,11 @@ class _Writer:
             self._one(slot, element, f"{path}[{index}]")
 
 
-def _utf_8(value: Any) -> bytes:
-    encoded: bytes = value.encode()
-    return encoded
-
-
-class _Ros1Writer(_Writer):
-    """The encoded bytes in ROS 1's layout."""
-
-    _fields = staticmethod(ros1_fields)
-    _text_bytes = staticmethod(_utf_8)
-    _zeros = 0
-
-    def _align(self, size: int) -> None:
-        """Add no padding, which ROS 1 does not have."""
-
-    def _end_of_empty(self) -> None:
-        """Add nothing: a message without fields has no bytes."""
-
-    def _text(self, slot: Slot, value: Any, path: str) -> None:
-        if slot.kind == "wstring":
-            self._refuse(path, "a type that ROS 1 has, which has no wstring", value)
-        super()._text(slot, value, path)
-
-
 _BLOCKS = frozenset({*ARRAY_CODES, *OCTETS, "bool"})
 
 
 def _number(kind: str, value: Any) -> Any:
-    """Return a value as ``struct`` packs it for a type.
-
-    Raises:
-        TypeError: The value is of another kind.
-        OverflowError: The value is outside the range of the type.
-    """
+    """Return a value as ``struct`` packs it for a type."""
     if kind == "bool" and value in TRUTH:
         return TRUTH[value]
     if kind in ("float32", "float64"):
@@ -305,24 +242,22 @@ def _number(kind: str, value: Any) -> Any:
     return number & 0xFF if kind == "byte" else number
 
 
-class _Reader:
+class _PlainReader:
     """A position in the bytes; alignment counts from the first byte after the header."""
 
-    _fields = staticmethod(slots)
-    _zeros = 1  # behind a string
-
-    def __init__(self, type_name: str, data: bytes, order: str, at: int = len(_HEADER)) -> None:
+    def __init__(self, type_name: str, data: bytes, order: str, layout: ByteLayout) -> None:
         self._type = type_name
         self._data = data
         self._order = order
-        self._at = at
+        self._layout = layout
+        self._at = len(layout.header)
 
     def _refuse(self, path: str, reason: str) -> NoReturn:
         text = f"{path}: {reason}" if path else reason
         raise DecodeError(self._type, self._at, text) from None
 
     def _take(self, size: int, path: str, what: str, alignment: int = 1) -> bytes:
-        start = self._at + self._padding(alignment)
+        start = self._at + (len(self._layout.header) - self._at) % self._layout.limit(alignment)
         left = len(self._data) - start
         if size > left:
             self._at = min(start, len(self._data))
@@ -330,23 +265,17 @@ class _Reader:
         self._at = start + size
         return self._data[start : self._at]
 
-    def _padding(self, alignment: int) -> int:
-        return (len(_HEADER) - self._at) % alignment
-
     def _scalar(self, kind: str, path: str) -> Any:
         size = SCALAR_SIZES[kind]
         packed = self._take(size, path, kind, size)
         return struct.unpack(self._order + SCALAR_CODES[kind], packed)[0]
 
     def message(self, cls: Any, path: str) -> Any:
-        fields = self._fields(cls)
-        if not fields:
-            self._take_empty(path)
+        fields = self._layout.fields(cls)
+        if not fields and self._layout.empty:
+            self._take(self._layout.empty, path, "an empty message")
         prefix = f"{path}." if path else ""
         return cls(**{slot.name: self._field(slot, prefix + slot.name) for slot in fields})
-
-    def _take_empty(self, path: str) -> None:
-        self._take(1, path, "an empty message")
 
     def _field(self, slot: Slot, path: str) -> Any:
         if slot.shape == "one":
@@ -373,20 +302,20 @@ class _Reader:
 
     def _text(self, slot: Slot, path: str) -> str:
         wide = slot.kind == "wstring"
+        if wide and self._layout is ROS1:
+            self._refuse(path, "ROS 1 has no wstring")
         length = self._scalar("uint32", path)
         packed = self._take(length * 4 if wide else length, path, f"a {slot.kind}")
-        content = length if wide else max(length - self._zeros, 0)
+        content = length if wide else max(length - self._layout.zeros, 0)
         if slot.bound and content > slot.bound:
             self._refuse(path, f"expected at most {slot.bound} units, got {content}")
         try:
             if not wide:
-                return self._text_of(packed)
+                bare = packed[: len(packed) - self._layout.zeros]
+                return bare.decode(errors=self._layout.errors)
             return read_wide(self._swapped("I", packed).tobytes())
         except (UnicodeDecodeError, OverflowError) as error:
             self._refuse(path, f"not a valid {slot.kind}: {error}")
-
-    def _text_of(self, packed: bytes) -> str:
-        return packed[:-1].decode()
 
     def _block(self, kind: str, count: int, path: str) -> Any:
         if not count:
@@ -405,28 +334,3 @@ class _Reader:
         if (self._order == ">") != (sys.byteorder == "big"):
             block.byteswap()
         return block
-
-
-class _Ros1Reader(_Reader):
-    """A position in the bytes of ROS 1's layout."""
-
-    _fields = staticmethod(ros1_fields)
-    _zeros = 0
-
-    def __init__(self, type_name: str, data: bytes) -> None:
-        super().__init__(type_name, data, "<", 0)
-
-    def _padding(self, _alignment: int) -> int:
-        return 0
-
-    def _take_empty(self, path: str) -> None:
-        """Take nothing: a message without fields has no bytes."""
-
-    def _text(self, slot: Slot, path: str) -> str:
-        if slot.kind == "wstring":
-            self._refuse(path, "ROS 1 has no wstring")
-        return super()._text(slot, path)
-
-    def _text_of(self, packed: bytes) -> str:
-        # roscpp sends any bytes as a string, and genpy replaces those that are not UTF-8.
-        return packed.decode(errors="replace")

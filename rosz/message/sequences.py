@@ -11,20 +11,10 @@ from struct import Struct
 from struct import error as struct_error
 from typing import Any
 
-__all__ = (
-    "TRUTH",
-    "StringList",
-    "Texts",
-    "flags",
-    "numbers",
-    "octets",
-    "pack_wide",
-    "put_text",
-    "read_wide",
-)
+from rosz.message.layout import CDR, ByteLayout
 
 TRUTH = {False: False, True: True}
-"""The values of a bool, and what equals them, such as numpy's; any other one is a KeyError."""
+"""The values of a bool, and values equal to them, such as numpy's; any other is a KeyError."""
 
 _OCTET_FORMATS = frozenset({"B", "b", "c", "?"})
 
@@ -131,9 +121,9 @@ def octets(value: Any, size: int = -1) -> bytes | memoryview:
         TypeError: The value is not a sequence of integers.
         ValueError: A number is not in 0..255, or the number of elements is wrong.
     """
-    found: bytes | memoryview
+    block: bytes | memoryview
     if type(value) is bytes:
-        found = value
+        block = value
     else:
         try:
             view = memoryview(value)
@@ -141,18 +131,18 @@ def octets(value: Any, size: int = -1) -> bytes | memoryview:
             if isinstance(value, str | int | dict | set):
                 raise
             _refuse_iterator(value)
-            found = bytes(value)
+            block = bytes(value)
         else:
             if view.format in _OCTET_FORMATS and view.c_contiguous:
-                found = view.cast("B") if view.nbytes else b""
+                block = view.cast("B") if view.nbytes else b""
             else:
                 try:
-                    found = bytes(_flat(value.tolist()))
+                    block = bytes(_flat(value.tolist()))
                 except NotImplementedError as error:  # a format that only numpy reads
                     raise TypeError(str(error)) from None
-    if len(found) != size >= 0:
-        raise ValueError(f"expected {size} elements, got {len(found)}")
-    return found
+    if len(block) != size >= 0:
+        raise ValueError(f"expected {size} elements, got {len(block)}")
+    return block
 
 
 def flags(value: Any, size: int = -1) -> bytes:
@@ -166,10 +156,10 @@ def flags(value: Any, size: int = -1) -> bytes:
         raise TypeError(f"'{type(value).__name__}' is not a sequence of truth values")
     _refuse_iterator(value)
     plain = _flat(value.tolist()) if hasattr(value, "tolist") else value
-    found = bytes(plain).translate(_ONES)
-    if len(found) != size >= 0:
-        raise ValueError(f"expected {size} elements, got {len(found)}")
-    return found
+    block = bytes(plain).translate(_ONES)
+    if len(block) != size >= 0:
+        raise ValueError(f"expected {size} elements, got {len(block)}")
+    return block
 
 
 _ONES = b"\0" + b"\1" * 255
@@ -178,36 +168,27 @@ _ONES = b"\0" + b"\1" * 255
 _pack_count = Struct("<I").pack
 _read_count = Struct("<I").unpack_from
 
+# Strings that do not repeat must not fill the memory.
 _MOST_TEXTS = 4096
 _LONGEST_TEXT = 128
 _LARGEST_LIST = 1 << 14
-
-
-def put_text(value: Any) -> bytes:
-    """Return the UTF-8 bytes of a string, with its NUL.
-
-    Raises:
-        ValueError: The string has U+0000, which the wire cannot carry, or half a surrogate pair.
-        AttributeError: The value is not a string.
-    """
-    octets: bytes = value.encode()
-    if 0 in octets:
-        at = value.index("\0")
-        raise ValueError(
-            f"the character at index {at} is NUL, which ends a string on the wire; "
-            "send bytes in a field of type uint8[]"
-        )
-    return octets + b"\0"
 
 
 class Texts(dict[str, tuple[int, bytes]]):
     """Cache of the encoded forms (length, bytes) of strings that repeat: frames, names, keys.
 
     Long strings are not cached, and a full cache is emptied.
+
+    Args:
+        layout: The byte layout of the strings.
     """
 
+    def __init__(self, layout: ByteLayout = CDR) -> None:
+        super().__init__()
+        self._layout = layout
+
     def __missing__(self, value: str) -> tuple[int, bytes]:
-        octets = put_text(value)
+        octets = self._layout.encode(value)
         entry = len(octets), octets
         if len(octets) <= _LONGEST_TEXT:
             if len(self) >= _MOST_TEXTS:
@@ -226,20 +207,25 @@ class StringList:
         size: Number of elements of a fixed array, which has no count on the wire; -1 if variable.
         most: Largest number of elements of a bounded sequence; -1 for no bound.
         bound: Largest length of each string in bytes; -1 for no bound.
+        layout: The byte layout.
     """
 
-    __slots__ = ("_bound", "_most", "_size", "read", "written")
+    __slots__ = ("_layout", "_longest", "_mask", "_most", "_size", "read", "written")
 
-    def __init__(self, size: int = -1, most: int = -1, bound: int = -1) -> None:
+    def __init__(
+        self, size: int = -1, most: int = -1, bound: int = -1, layout: ByteLayout = CDR
+    ) -> None:
         self._size = size
         self._most = most
-        self._bound = bound
+        self._longest = bound + layout.zeros if bound >= 0 else -1
+        self._layout = layout
+        self._mask = layout.limit(4) - 1
         empty = b"" if size >= 0 else bytes(4)
         self.written: tuple[list[str] | None, bytes] = ([], empty) if size < 0 else (None, b"")
         self.read: tuple[bytes, list[str]] = (bytes(4), []) if size < 0 else (b"\xff" * 8, [])
 
     def put(self, values: list[str]) -> bytes:
-        """Return the bytes of a list that starts at a multiple of four."""
+        """Return the bytes of a list that starts where a count is aligned."""
         if type(values) is not list:
             if isinstance(values, str | bytes):
                 raise TypeError("a string is not a list of strings")
@@ -248,10 +234,10 @@ class StringList:
         parts = [] if self._size >= 0 else [_pack_count(len(values))]
         length = 0
         for value in values:
-            octets = put_text(value)
-            if len(octets) > self._bound + 1 > 0:
+            octets = self._layout.encode(value)
+            if len(octets) > self._longest >= 0:
                 raise ValueError("a string is longer than its bound")
-            parts.append(bytes(-length & 3) + _pack_count(len(octets)) + octets)
+            parts.append(bytes(-length & self._mask) + _pack_count(len(octets)) + octets)
             length = len(octets)
         data = b"".join(parts)
         if len(data) <= _LARGEST_LIST:
@@ -259,7 +245,7 @@ class StringList:
         return data
 
     def take(self, data: bytes, offset: int) -> tuple[list[str], int]:
-        """Return the list at an offset, a multiple of four, and the offset after it."""
+        """Return the list at an offset where a count is aligned, and the offset after it."""
         start = offset
         count = self._size
         if count < 0:
@@ -268,14 +254,15 @@ class StringList:
             self._check(count)
         values: list[str] = []
         end = offset
+        zeros = self._layout.zeros
         for _ in range(count):
-            end = (end + 3) & -4
+            end = (end + self._mask) & ~self._mask
             (length,) = _read_count(data, end)
-            if length > self._bound + 1 > 0:
+            if length > self._longest >= 0:
                 raise ValueError("a string is longer than its bound")
             offset = end + 4
             end = offset + length
-            values.append(data[offset : end - 1].decode())
+            values.append(data[offset : end - zeros].decode())
         if end > len(data):
             raise struct_error("a string ends after the bytes do")
         if end - start <= _LARGEST_LIST:

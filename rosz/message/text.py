@@ -9,11 +9,9 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
-
-__all__ = ("FieldFilter", "strify_message")
 
 FieldFilter = Callable[[Any], Iterable[str]]
 """Function that returns the names of the fields of a message to show."""
@@ -41,16 +39,13 @@ def strify_message(
         field_filter: Function that returns the names of the fields of a message to show.
         fixed_numeric_width: Width of numbers in characters; their own when not given.
     """
-    return _Writer(time_offset, field_filter, fixed_numeric_width).value(val, indent)
+    return _YamlWriter(time_offset, field_filter, fixed_numeric_width).value(val, indent)
 
 
-class _Writer:
-    def __init__(
-        self, time_offset: Any, field_filter: FieldFilter | None, width: int | None
-    ) -> None:
-        self._offset = time_offset
-        self._filter = field_filter
-        self._width = width
+class _YamlWriter(NamedTuple):
+    offset: Any
+    filter: FieldFilter | None
+    width: int | None
 
     def value(self, value: Any, indent: str) -> str:  # noqa: PLR0911  # one per kind of value
         if isinstance(value, bool):
@@ -68,17 +63,17 @@ class _Writer:
         return str(value)
 
     def _number(self, value: float) -> str:
-        if self._width is None:
+        if self.width is None:
             return str(value)
         if isinstance(value, float):
-            text = f"{value:.{self._width}f}"
-            return text[: max(text.find("."), self._width)]
-        return f"{value:{self._width}d}"
+            text = f"{value:.{self.width}f}"
+            return text[: max(text.find("."), self.width)]
+        return f"{value:{self.width}d}"
 
     def _stamp(self, value: Any, indent: str) -> str:
-        if self._offset is not None and value._type == _TIME:
-            value = value - self._offset
-        width = self._width
+        if self.offset is not None and value._type == _TIME:
+            value = value - self.offset
+        width = self.width
         secs = str(value.sec) if width is None else f"{value.sec:{width}d}"
         nsecs = f"{value.nanosec:{9 if width is None else width}d}"
         return f"\n{indent}secs: {secs}\n{indent}nsecs: {nsecs}"
@@ -90,16 +85,16 @@ class _Writer:
         if isinstance(first, str):
             text = yaml.dump(values).rstrip("\n")
             return "\n" + "\n".join(indent + line for line in text.splitlines())
-        if self._width is not None and type(first) in (int, float):
+        if self.width is not None and type(first) in (int, float):
             return f"[{', '.join(self._number(number) for number in values)}]"
         if isinstance(first, int | float):
             return str(values)
-        return "\n" + "\n".join(f"{indent}- {self.value(one, indent + '  ')}" for one in values)
+        return "\n" + "\n".join(f"{indent}- {self.value(value, indent + '  ')}" for value in values)
 
     def _message(self, value: Any, indent: str) -> str:
         names = type(value).__slots__
-        if self._filter is not None:
-            wanted = set(self._filter(value))
+        if self.filter is not None:
+            wanted = set(self.filter(value))
             names = tuple(name for name in names if name in wanted)
         lines = (
             f"{indent}{name}: {self.value(_field(value, name), '  ' + indent)}" for name in names
@@ -109,10 +104,10 @@ class _Writer:
 
 def _field(value: Any, name: str) -> Any:
     """Return a field; bytes that are held as text, as in Python 2, become numbers."""
-    held = getattr(value, name)
-    if isinstance(held, str) and (name, "uint8") in {each[:2] for each in value._schema}:
-        return [ord(letter) for letter in held]
-    return held
+    given = getattr(value, name)
+    if isinstance(given, str) and (name, "uint8") in {each[:2] for each in value._schema}:
+        return [ord(letter) for letter in given]
+    return given
 
 
 def _quoted(value: str) -> str:

@@ -9,20 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from struct import Struct, error
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from rosz.message.base import Message
-from rosz.message.ros1_layout import ros1_fields
-from rosz.message.schema import SCALAR_SIZES, Slot, slots
-
-__all__ = ("compile_from_cdr", "compile_transcoder")
+from rosz.message.layout import CDR, ros1_fields
+from rosz.message.runtime import PADDING
+from rosz.message.schema import SCALAR_SIZES, SEQ, Slot, slots
 
 _Data: TypeAlias = bytes | bytearray | memoryview
-
-_HEADER = b"\0\1\0\0"
-_LITTLE_ENDIAN = 1
-_PADDING = tuple(bytes(size) for size in range(8))
-_SEQ = "seq"
 
 
 def compile_transcoder(
@@ -39,7 +33,7 @@ def compile_transcoder(
     """
     if not _is_alike(cls):
         return plainly
-    made: Callable[[_Data], bytes] = _compile(_ToCdr(), cls, plainly)
+    made: Callable[[_Data], bytes] = _compile(_TO_CDR, cls, plainly)
     return made
 
 
@@ -62,30 +56,31 @@ def compile_from_cdr(
 
     if not _is_alike(cls):
         return whole
-    made: Callable[[bytes, bytes], list[_Data]] = _compile(_FromCdr(), cls, whole)
+    made: Callable[[bytes, bytes], list[_Data]] = _compile(_FROM_CDR, cls, whole)
     return made
 
 
-def _compile(source: _Source, cls: type[Any], plainly: Callable[..., Any]) -> Callable[..., Any]:
-    source.message(cls)
-    source.flush()
+def _compile(direction: _Statements, cls: type[Any], plainly: Callable[..., Any]) -> Any:
+    copier = _Copier(direction)
+    copier.message(cls)
+    copier.flush()
     space: dict[str, Any] = {
-        "HEADER": _HEADER,
-        "PAD": _PADDING,
+        "HEADER": CDR.header,
+        "PAD": PADDING,
         "error": error,
         "length": Struct("<I").unpack_from,
         "pack": Struct("<I").pack,
         "plainly": plainly,
     }
-    exec(source.text(), space)  # noqa: S102  # the text is made of numbers and constant names
-    made: Callable[..., Any] = space["code"]
-    return made
+    source = "\n".join([*direction.head, *copier.lines, *direction.end])
+    exec(source, space)  # noqa: S102  # the text is made of numbers and constant names
+    return space["code"]
 
 
 def _is_alike(cls: type[Any]) -> bool:
     """Return whether a type has fields, the same in both layouts, and none with bounds."""
     here = ros1_fields(cls)
-    if not here or len(here) != len(slots(cls)) + (here[0].name == _SEQ and cls._sequenced):
+    if not here or len(here) != len(slots(cls)) + (here[0] == SEQ and cls._sequenced):
         return False
     return all(
         not slot.bound
@@ -99,42 +94,109 @@ def _is_alike(cls: type[Any]) -> bool:
     )
 
 
-class _Source:
-    """Writes the function.
+class _Statements(NamedTuple):
+    """The statements that differ between the two directions.
 
-    ``p`` is the position in the data, behind CDR's header. A run is a number of bytes that are
-    copied as they are, since they need no padding within.
+    ``p`` is the position in the data, behind CDR's header; ``o`` is the position in the CDR that is
+    made.
+
+    Attributes:
+        head: The beginning of the function.
+        align: Skips or adds the padding before numbers, where ``{mask}`` is their size less one.
+        copy: Copies ``{size}`` bytes.
+        text: Copies a string.
+        seq: Leaves out or adds the sequence number of a header.
+        end: The end of the function.
     """
 
-    def __init__(self) -> None:
-        self._lines: list[str] = []
+    head: tuple[str, ...]
+    align: tuple[str, ...]
+    copy: tuple[str, ...]
+    text: tuple[str, ...]
+    seq: str
+    end: tuple[str, ...]
+
+
+_TO_CDR = _Statements(
+    head=(
+        "def code(data):",
+        "    try:",
+        "        p = o = 0",
+        "        out = [HEADER]",
+        "        add = out.append",
+    ),
+    align=("k = -o & {mask}", "if k: add(PAD[k]); o += k"),
+    copy=("add(data[p:p + {size}])", "p += {size}", "o += {size}"),
+    text=(
+        "n, = length(data, p)",
+        "p += 4",
+        "add(pack(n + 1))",
+        "add(data[p:p + n])",
+        'add(b"\\0")',
+        "p += n",
+        "o += n + 5",
+    ),
+    seq="p += 4",
+    end=(
+        "        if p > len(data): raise ValueError",
+        "    except (error, ValueError):",
+        "        return plainly(data)",
+        '    return b"".join(out)',
+    ),
+)
+
+_FROM_CDR = _Statements(
+    head=(
+        "def code(whole, seq):",
+        "    try:",
+        "        if whole[1] != 1: raise ValueError",  # little-endian
+        "        data = memoryview(whole)[4:]",
+        "        p = 0",
+        "        out = []",
+        "        add = out.append",
+    ),
+    align=("p += -p & {mask}",),
+    copy=("add(data[p:p + {size}])", "p += {size}"),
+    text=(
+        "n, = length(data, p)",
+        "p += 4",
+        "add(pack(n - 1))",
+        "add(data[p:p + n - 1])",
+        "p += n",
+    ),
+    seq="add(seq)",
+    end=(
+        "        if p > len(data): raise ValueError",
+        "    except (error, ValueError, IndexError):",
+        "        return plainly(whole, seq)",
+        "    return out",
+    ),
+)
+
+
+class _Copier:
+    """Writes the statements that copy a message.
+
+    A run is a number of bytes that are copied as they are, since they need no padding within.
+    """
+
+    def __init__(self, direction: _Statements) -> None:
+        self.lines: list[str] = []
+        self._direction = direction
         self._indent = " " * 8
         self._alignment = 0
         self._size = 0
         self._depth = 0
 
-    def text(self) -> str:
-        """Return the source."""
-        raise NotImplementedError
+    def _emit(self, *lines: str) -> None:
+        self.lines += [self._indent + line for line in lines]
 
     def _align(self, size: int) -> None:
-        """Emit the padding before numbers of a size."""
-        raise NotImplementedError
+        if size > 1:
+            self._emit(*(line.format(mask=size - 1) for line in self._direction.align))
 
     def _copy(self, size: str) -> None:
-        """Emit the copying of a number of bytes."""
-        raise NotImplementedError
-
-    def _text(self) -> None:
-        """Emit the copying of a string."""
-        raise NotImplementedError
-
-    def _sequence_number(self) -> None:
-        """Emit what becomes of the sequence number of a header."""
-        raise NotImplementedError
-
-    def _emit(self, *lines: str) -> None:
-        self._lines += [self._indent + line for line in lines]
+        self._emit(*(line.format(size=size) for line in self._direction.copy))
 
     def _take(self, size: int) -> None:
         """Add a number to the run, or begin another one where it would need padding."""
@@ -154,9 +216,9 @@ class _Source:
     def message(self, cls: type[Any]) -> None:
         """Copy the fields of a message."""
         fields = ros1_fields(cls)
-        if fields[0].name == _SEQ and cls._sequenced:
+        if fields[0] == SEQ and cls._sequenced:
             self.flush()
-            self._sequence_number()
+            self._emit(self._direction.seq)
             fields = fields[1:]
         for slot in fields:
             self._field(slot)
@@ -196,90 +258,7 @@ class _Source:
             self.message(kind)
         elif kind == "string":
             self.flush()
-            self._text()
+            self._align(4)
+            self._emit(*self._direction.text)
         else:
             self._take(SCALAR_SIZES[kind])
-
-
-class _ToCdr(_Source):
-    """``o`` is the position in the CDR."""
-
-    def text(self) -> str:
-        return "\n".join(
-            [
-                "def code(data):",
-                "    try:",
-                "        p = o = 0",
-                "        out = [HEADER]",
-                "        add = out.append",
-                *self._lines,
-                "        if p > len(data): raise ValueError",
-                "    except (error, ValueError):",
-                "        return plainly(data)",
-                '    return b"".join(out)',
-            ]
-        )
-
-    def _align(self, size: int) -> None:
-        if size > 1:
-            self._emit(f"k = -o & {size - 1}", "if k: add(PAD[k]); o += k")
-
-    def _copy(self, size: str) -> None:
-        self._emit(f"add(data[p:p + {size}])", f"p += {size}", f"o += {size}")
-
-    def _text(self) -> None:
-        self._align(4)
-        self._emit(
-            "n, = length(data, p)",
-            "p += 4",
-            "add(pack(n + 1))",
-            "add(data[p:p + n])",
-            'add(b"\\0")',
-            "p += n",
-            "o += n + 5",
-        )
-
-    def _sequence_number(self) -> None:
-        self._emit("p += 4")
-
-
-class _FromCdr(_Source):
-    """Writes the function of the other direction."""
-
-    def text(self) -> str:
-        return "\n".join(
-            [
-                "def code(whole, seq):",
-                "    try:",
-                f"        if whole[1] != {_LITTLE_ENDIAN}: raise ValueError",
-                "        data = memoryview(whole)[4:]",
-                "        p = 0",
-                "        out = []",
-                "        add = out.append",
-                *self._lines,
-                "        if p > len(data): raise ValueError",
-                "    except (error, ValueError, IndexError):",
-                "        return plainly(whole, seq)",
-                "    return out",
-            ]
-        )
-
-    def _align(self, size: int) -> None:
-        if size > 1:
-            self._emit(f"p += -p & {size - 1}")
-
-    def _copy(self, size: str) -> None:
-        self._emit(f"add(data[p:p + {size}])", f"p += {size}")
-
-    def _text(self) -> None:
-        self._align(4)
-        self._emit(
-            "n, = length(data, p)",
-            "p += 4",
-            "add(pack(n - 1))",
-            "add(data[p:p + n - 1])",
-            "p += n",
-        )
-
-    def _sequence_number(self) -> None:
-        self._emit("add(seq)")

@@ -1,8 +1,8 @@
 """Numeric sequences of received messages as ROS 1 code knows them: tuples.
 
-`decoder` and `ros1_decoder` return generated decoders that make tuples where the native ones make
-arrays. A tuple needs an object for each number, so a long sequence becomes a `LongTuple`: an array
-that behaves as a tuple. A ``byte`` becomes what it is in ROS 1, a signed number.
+`tuple_decoder` and `ros1_tuple_decoder` return generated decoders that make tuples where the native
+ones make arrays. A tuple needs an object for each number, so a long sequence becomes a `LongTuple`:
+an array that behaves as a tuple. A ``byte`` is a signed number, as in ROS 1.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from rosz.message.schema import ARRAY_CODES, Slot, slots
-
-__all__ = ("LONGEST_TUPLE", "LongTuple", "decoder", "ros1_decoder")
 
 LONGEST_TUPLE = 4096
 """Largest number of elements of a tuple, which takes 50 µs to make; more become a `LongTuple`."""
@@ -73,8 +71,8 @@ class LongTuple(_Array):
         return repr(tuple(self))
 
     def __getitem__(self, index: Any) -> Any:
-        found = array.__getitem__(self, index)
-        return tuple(found) if isinstance(index, slice) else found
+        value = array.__getitem__(self, index)
+        return tuple(value) if isinstance(index, slice) else value
 
     def __add__(self, other: Any) -> Any:
         return tuple(self) + _plain(other)
@@ -107,9 +105,9 @@ def _plain(other: Any) -> Any:
 
 def _long(code: str, block: Any) -> LongTuple:
     _teach_json()
-    found = LongTuple(code)
-    found.frombytes(block)
-    return found
+    numbers = LongTuple(code)
+    numbers.frombytes(block)
+    return numbers
 
 
 @cache
@@ -150,44 +148,38 @@ def _make_of(code: str, data: bytes, start: int, end: int) -> Any:
     return _make(code, memoryview(data)[start:end])
 
 
-_INSTEAD = {"_array": _make, "_read_block": _make_of, "read_block": _make_of}
+_INSTEAD = {"_array": _make, "_read_block": _make_of}
 """The functions that stand in generated decoders, by the names that these have for them."""
-
-_EXPLAIN = "_explain", "plain"
-"""Names that generated decoders have for the slow codec."""
 
 
 @cache
-def decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
+def tuple_decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
     """Return the decoder of CDR of a message class that makes tuples."""
     return _with_signs(message_type, _with_tuples(message_type._decode))
 
 
 @cache
-def ros1_decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
+def ros1_tuple_decoder(message_type: type[Any]) -> Callable[[bytes], Any]:
     """Return the decoder of ROS 1's byte layout of a message class that makes tuples."""
     decode = _with_tuples(message_type._decode_ros1)  # noqa: SLF001  # rosz's
     return _with_signs(message_type, decode)
 
 
-def _with_tuples(plain: Any) -> Callable[[bytes], Any]:
+def _with_tuples(decode: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
     """Return a generated decoder with other functions in its global names."""
-    if not isinstance(plain, FunctionType):
-        decode: Callable[[bytes], Any] = plain
+    code = getattr(decode, "__code__", None)
+    if code is None or _INSTEAD.keys().isdisjoint(code.co_names):
         return decode
-    names = plain.__globals__
-    used = {name for name in _EXPLAIN if name in plain.__code__.co_names}
-    if not used or _INSTEAD.keys().isdisjoint(plain.__code__.co_names):
-        return plain
-    explain = names[used.pop()]
+    names: dict[str, Any] = decode.__globals__
+    explain = names["_explain"]
 
-    def decode_plainly(data: bytes, cls: type[Any]) -> Any:
-        message = explain(data, cls)
+    def decode_plainly(*args: Any) -> Any:
+        message = explain(*args)
         _convert(message)
         return message
 
-    instead = {**_INSTEAD, **dict.fromkeys(_EXPLAIN, decode_plainly)}
-    return FunctionType(plain.__code__, {**names, **instead}, plain.__name__)
+    instead = {**names, **_INSTEAD, "_explain": decode_plainly}
+    return FunctionType(code, instead, decode.__name__)
 
 
 def _with_signs(cls: Any, decode: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
@@ -206,7 +198,7 @@ def _with_signs(cls: Any, decode: Callable[[bytes], Any]) -> Callable[[bytes], A
 
 @cache
 def _signer(cls: Any) -> Callable[[Any], None] | None:
-    """Return a function that sets each ``byte`` of a message to what it is in ROS 1, an int8.
+    """Return a function that sets each ``byte`` of a message to its signed number, as in ROS 1.
 
     None for a class that has none.
     """
@@ -222,41 +214,37 @@ def _signer(cls: Any) -> Callable[[Any], None] | None:
 
 
 def _signed(slot: Slot) -> Callable[[Any], Any] | None:
-    """Return what makes the signed value of a field, or None if the value has no ``byte``."""
+    """Return a function that makes the signed value of a field; None if it has no ``byte``."""
     if slot.kind == "byte":
-        return _sign_one if slot.shape == "one" else _sign_many
+        return _sign_byte if slot.shape == "one" else partial(_make, "b")
     kind: Any = slot.kind
     sign = None if isinstance(kind, str) else _signer(kind)
     if sign is None:
         return None
 
     def change(value: Any) -> Any:
-        for one in _messages(value):
-            sign(one)
+        for message in _messages(value):
+            sign(message)
         return value
 
     return change
 
 
-def _sign_one(value: int) -> int:
+def _sign_byte(value: int) -> int:
     return value - 0x100 if value > 0x7F else value  # noqa: PLR2004  # the largest int8
-
-
-def _sign_many(values: bytes) -> Any:
-    return _make("b", values)
 
 
 def _convert(message: Any) -> None:
     """Convert the numeric sequences of a message from arrays, in place."""
     for slot in slots(type(message)):
         value = getattr(message, slot.name)
-        for one in _messages(value):
-            _convert(one)
+        for below in _messages(value):
+            _convert(below)
         if slot.shape != "one" and slot.kind in ARRAY_CODES and isinstance(value, array):
             setattr(message, slot.name, _make(value.typecode, value.tobytes()))
 
 
 def _messages(value: Any) -> Iterator[Any]:
-    for one in value if isinstance(value, list) else [value]:
-        if hasattr(one, "_schema"):
-            yield one
+    for element in value if isinstance(value, list) else [value]:
+        if hasattr(element, "_schema"):
+            yield element

@@ -1,11 +1,9 @@
 """Nodes and their parts: publishers, subscriptions, services, clients, actions, timers, a log.
 
-`action_server`, `action_client`, `action_watch` and `goals` are imported on their own, by what uses
-actions, and so are `type_description`, `ros2_parameters` and `ros2_values`, by what needs
-definitions of other nodes, or parameters in the form of ROS 2.
+`rosz.node.actions` is imported on its own, by users of actions; `rosz.node.ros2` has the services
+that only nodes of ROS 2 have.
 """
 
-from rosz.node.bridged import BridgedNode
 from rosz.node.client import Client
 from rosz.node.clock import Clock
 from rosz.node.context import Context
@@ -22,7 +20,7 @@ from rosz.node.log_handlers import (
     severity,
     severity_name,
 )
-from rosz.node.node import Node
+from rosz.node.node import BridgedNode, Node
 from rosz.node.publisher import Publisher, SubscriberLink
 from rosz.node.service import Service
 from rosz.node.signals import install as handle_signals
@@ -30,16 +28,6 @@ from rosz.node.signals import of_program
 from rosz.node.standard import serve_loggers, simulate
 from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Rate, Timer, TimerEvent
-
-PUBLIC_MODULES = (
-    "action_client",
-    "action_server",
-    "action_watch",
-    "goals",
-    "ros2_parameters",
-    "ros2_values",
-    "type_description",
-)
 
 __all__ = (
     "BridgedNode",

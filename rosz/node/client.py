@@ -19,19 +19,17 @@ from rosz.node.core import NodeCore
 from rosz.node.entity import Entity
 from rosz.node.incompatible import explain_incompatible
 from rosz.qos import QoS
-from rosz.session import Cancellation, clamp_timeout
+from rosz.session import Cancellation, Reply, clamp_timeout
 from rosz.wire import Kind, pack_attachment
 
 if TYPE_CHECKING:
     from rosz.graph import View
     from rosz.message import Message
     from rosz.message import Service as ServiceType
-    from rosz.session import Reply
-
-__all__ = ("Client",)
 
 _ATTEMPTS = 10
 _PAUSE = 0.02
+"""Seconds between attempts: the route to a server comes up some milliseconds after its token."""
 _AT_ONCE = 0.01
 """Seconds within which a query that reaches nobody ends."""
 
@@ -95,7 +93,7 @@ class Client(Entity):
         limit = self.timeout if timeout is None else clamp_timeout(timeout)
         deadline = time.monotonic() + limit
         payload = self.service_type.Request._encode(request)
-        if not self._is_served():
+        if not self.served:
             self._find_server(limit)
         for _ in range(_ATTEMPTS):
             began = time.monotonic()
@@ -105,7 +103,7 @@ class Client(Entity):
             # The query reached nobody: the route to a server may come a moment after its token.
             # A server that got the request and then ended may have done the work: it does not get
             # the request again.
-            if time.monotonic() - began > _AT_ONCE or not self._is_served():
+            if time.monotonic() - began > _AT_ONCE or not self.served:
                 break
             time.sleep(_PAUSE)
         raise ServiceError(f"service [{self.name}]: the server ended before it answered")
@@ -153,8 +151,10 @@ class Client(Entity):
             f"answer of service '{self.name}'", limit, f"{hint}; {stopped}" if stopped else hint
         )
 
-    def _is_served(self) -> bool:
-        """Return whether the service is served with this type, looking once at each view."""
+    @property
+    def served(self) -> bool:
+        """Whether a node serves the service with this type, as far as it is known."""
+        # Each view is looked at once.
         view = self.others.view()
         seen, served = self._known
         if seen is not view:
@@ -167,7 +167,7 @@ class Client(Entity):
         self.check_open("call")
         context = self.node.context
         context.mesh.ready.wait(min(limit, _GRACE))
-        if self._is_served():
+        if self.served:
             return
         view = self.others.refresh(min(limit, _GRACE))
         if not any(map(self.matches, view.servers(self.name))):
@@ -181,11 +181,6 @@ class Client(Entity):
         if others:
             return f": {explain_incompatible(self.token, others[0])}"
         return near_miss(self.name, view.services())
-
-    @property
-    def served(self) -> bool:
-        """Whether a node serves the service with this type, as far as it is known."""
-        return self._is_served()
 
     def wait_for_service(self, timeout: float = 10.0) -> None:
         """Wait until a node serves the service with this type.

@@ -22,8 +22,6 @@ import msgspec
 from rosz.errors import TimeMovedBackwards, UsageError
 from rosz.session import LONGEST_WAIT
 
-__all__ = ("Clock", "TimeJump", "nanoseconds")
-
 
 def nanoseconds(seconds: float, what: str) -> int:
     """Return seconds as nanoseconds.
@@ -75,7 +73,7 @@ class _Sleeper:
         return self.target is not None and (now >= self.target or now < self.start)
 
 
-class _Source:
+class _TimeSource:
     """The time that a clock and its branches share."""
 
     __slots__ = ("advancing", "last", "now", "observers", "simulated", "sleepers")
@@ -105,7 +103,7 @@ class Clock:
     """
 
     def __init__(self) -> None:
-        self._source = _Source()
+        self._source = _TimeSource()
         self._parent: Clock | None = None
         self._closed = False
 

@@ -7,31 +7,35 @@ import itertools
 import logging
 import socket
 import threading
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
+
+import msgspec
 
 from rosz import remap
 from rosz.environment import Environment, package_index
-from rosz.errors import ClosedError
+from rosz.errors import ClosedError, RoszError
 from rosz.graph import Graph
 from rosz.interrupts import InterruptDeferral
-from rosz.lifecycle import Lifecycle
+from rosz.lifecycle import Closable, Closing, Lifecycle
 from rosz.node.clock import Clock
 from rosz.node.direct_delivery import DirectDelivery
-from rosz.node.dropped import DroppedSamples
 from rosz.node.local_delivery import LocalDelivery
 from rosz.program import current
 from rosz.session import (
     Dialling,
     LocalPeers,
     MeshReadiness,
+    Query,
     Session,
     SessionConfig,
     clamp_timeout,
     serve_links,
 )
+from rosz.wire import dropped_key
 
 if TYPE_CHECKING:
     from rosz.message import Message
@@ -39,12 +43,10 @@ if TYPE_CHECKING:
     from rosz.security import LocalPermissions
     from rosz.typestore import TypeStore
 
-__all__ = ("Context",)
-
 _log = logging.getLogger("rosz.context")
 
 
-class Context:
+class Context(Closing):
     """Owner of everything that lives as long as the program takes part in the network.
 
     The programs of a container share the session of one context, and with it the graph and the
@@ -120,7 +122,7 @@ class Context:
             self._forget_end = _at_end(self)
 
     def _share(self, shared: Context) -> None:
-        """Use what belongs to the context of the container."""
+        """Use the network of the context of the container."""
         self._shared = shared
         self.session = shared.session
         self.graph = shared.graph
@@ -310,12 +312,6 @@ class Context:
         """Shut down; the same as `shutdown` without a reason."""
         self.shutdown()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
-
 
 def _at_end(context: Context) -> Callable[[], object]:
     """Shut a context down when its program ends; return a function that takes this back."""
@@ -327,9 +323,45 @@ def _at_end(context: Context) -> Callable[[], object]:
 
 
 def _permissions(config: SessionConfig) -> LocalPermissions | None:
-    """Return what the rules say of this machine, if others receive what it declares."""
+    """Return the permissions of this machine, if its declarations reach others."""
     if config.keys is None or not (config.reaches_beyond or config.must_connect):
         return None
     from rosz.security import LocalPermissions
 
     return LocalPermissions.find(config.keys, socket.gethostname())
+
+
+class DroppedSamples:
+    """Counts dropped samples, and tells those who query the counts.
+
+    The queryable is declared with the first dropped sample.
+
+    Args:
+        session: The session.
+        domain: The ROS domain.
+    """
+
+    def __init__(self, session: Session, domain: int) -> None:
+        self._session = session
+        self._key = dropped_key(domain, session.zid)
+        self._counts: Counter[int] = Counter()
+        self._lock = threading.RLock()  # a signal handler may publish meanwhile
+        self._queryable: Closable | None = None
+
+    def add(self, entity_id: int, count: int) -> None:
+        """Count samples that an entity has dropped."""
+        with self._lock:
+            self._counts[entity_id] += count
+            if self._queryable is None:
+                try:
+                    self._queryable = self._session.queryable(self._key, self._reply)
+                except RoszError as error:  # the session closes
+                    logging.getLogger("rosz.node").debug(
+                        "nobody can query dropped samples: %s", error
+                    )
+
+    def _reply(self, query: Query) -> None:
+        with query:
+            with self._lock:
+                counts = dict(self._counts)
+            query.reply(self._key, msgspec.msgpack.encode(counts))

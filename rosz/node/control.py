@@ -1,4 +1,8 @@
-"""Requests to a node about itself: information, shutdown, levels of loggers."""
+"""Requests of other processes to a node, and the shutdown when a newer node takes its name.
+
+The requests ask for information, shut the node down, or set the levels of its loggers. If two nodes
+in a domain have one name, the older one shuts down, as with ROS 1's master.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +10,25 @@ import logging
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
 from rosz.errors import RoszError
+from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
-from rosz.wire import nodes_key, own_key, parse_token
+from rosz.session import Query
+from rosz.wire import ProcessToken, nodes_key, own_key, parse_token
 from rosz.worker import Worker, start_thread
-
-if TYPE_CHECKING:
-    from rosz.node.context import Context
-    from rosz.session import Query
-
-__all__ = ("NodeInfo", "Request", "control_key", "serve_control")
 
 _log = logging.getLogger("rosz.control")
 
 _THREADS = 4
 _TOKENS_TIMEOUT = 0.5
+_NEWER = "new node registered with same name"
+_REPLY_TIMEOUT = 1.0
+_TOGETHER = 0.2
+"""Seconds between two starts below which the times in the tokens tell which node is newer."""
 
 
 class NodeInfo(msgspec.Struct, frozen=True):
@@ -125,7 +129,7 @@ def _respond(node: NodeCore, request: Request) -> tuple[Any, str]:
 
 
 def _info(node: NodeCore) -> NodeInfo:
-    process, words = node.process, (sys.executable, *sys.argv)
+    process, words, context = node.process, (sys.executable, *sys.argv), node.context
     return NodeInfo(
         node.name,
         process.pid,
@@ -135,11 +139,53 @@ def _info(node: NodeCore) -> NodeInfo:
         process.started,
         time.monotonic() - node.began,
         time.time_ns(),
-        _visible_sessions(node.context),
+        # The sessions whose nodes its own session sees.
+        sorted(
+            {
+                parse_token(key).zid
+                for key in context.session.live_tokens(nodes_key(context.domain), _TOKENS_TIMEOUT)
+            }
+        ),
     )
 
 
-def _visible_sessions(context: Context) -> list[str]:
-    """Return the ids of the sessions whose nodes the session of a context sees."""
-    keys = context.session.live_tokens(nodes_key(context.domain), _TOKENS_TIMEOUT)
-    return sorted({parse_token(key).zid for key in keys})
+def yield_to_newer(node: NodeCore) -> None:
+    """Shut a node down when a newer one of the same name appears."""
+    duplicates = Worker[ProcessToken](
+        f"rosz-takeover{node.name}", lambda other: _compare(node, other), threads=_THREADS
+    )
+
+    def appeared(other: ProcessToken, alive: bool) -> None:
+        if alive and other.node == node.name and other != node.process:
+            duplicates.submit(other)
+
+    node.keep(Registration(lambda: duplicates.close(0)))
+    namesakes = node.keep(node.context.graph.follow_processes(node.name))
+    node.keep(Registration(namesakes.listen(appeared)))
+
+
+def _compare(node: NodeCore, other: ProcessToken) -> None:
+    """Shut a node down if another one of its name is newer."""
+    if not node.is_shutdown and _is_newer(node, other):
+        text = "shutdown request: [%s] Reason: %s (process %d on %s)"
+        node.log.warning(text, node.name, _NEWER, other.pid, other.host)
+        node.shutdown(_NEWER)
+
+
+def _is_newer(node: NodeCore, other: ProcessToken) -> bool:
+    """Return whether another node is newer, even if the clocks of the two machines differ."""
+    key = control_key(other.domain, other.zid, other.node_id)
+    request = msgspec.msgpack.encode(Request("info"))
+    asked = time.monotonic()
+    try:
+        replies = node.context.session.get(key, payload=request, timeout=_REPLY_TIMEOUT)
+        infos = [msgspec.msgpack.decode(r.payload, type=NodeInfo) for r in replies if r.ok]
+    except (RoszError, msgspec.DecodeError):
+        infos = []
+    if infos:
+        round_trip = time.monotonic() - asked
+        lead = asked + round_trip / 2 - node.began - infos[0].age
+        if abs(lead) > max(_TOGETHER, round_trip):
+            return lead > 0
+    # They started together, or the other one did not respond: compare the times in their tokens.
+    return other.newer_than(node.process)

@@ -12,11 +12,11 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from rosz import names
 from rosz.errors import ClosedError
-from rosz.lifecycle import Closable, Hook, Lifecycle, Registration
+from rosz.lifecycle import Closable, Closing, Hook, Lifecycle, Registration
 from rosz.node.clock import Clock
 from rosz.node.context import Context
 from rosz.node.log import NodeLog
@@ -25,14 +25,12 @@ from rosz.program import Program, current
 from rosz.wire import Kind, ProcessToken, Token, format_process, format_token
 
 if TYPE_CHECKING:
-    from rosz.params.api import Params
-
-__all__ = ("NodeCore",)
+    from rosz.params.replica import Params
 
 P = TypeVar("P", bound=Closable)
 
 
-class NodeCore:
+class NodeCore(Closing):
     """A node without the methods that make publishers, subscriptions, services and timers.
 
     For its arguments see `rosz.Node`.
@@ -135,7 +133,7 @@ class NodeCore:
             ClosedError: The context is shut down, and has no replica.
         """
         if self._params is None:
-            from rosz.params.api import Params
+            from rosz.params.replica import Params
 
             self._params = Params(self.context.params, self.name, self.remaps)
         return self._params
@@ -206,12 +204,6 @@ class NodeCore:
             )
         if closed:  # until then a context that shuts down on another thread waits for this one
             self._remove_hook()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}{' closed' if self._lifecycle.closing else ''}>"

@@ -1,24 +1,25 @@
-"""Decoding: from Zenoh's samples to messages, with where they come from and what is missing."""
+"""Decoding: from Zenoh's samples to messages, with their origins and the number of lost ones."""
 
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from rosz.errors import DecodeError
+from rosz.errors import DecodeError, RoszError
 from rosz.node.fetch import FetchedSample
 from rosz.node.local_delivery import LocalSample
 from rosz.session import Reply, Sample
-from rosz.wire import read_attachment
+from rosz.wire import NO_HASH, read_attachment, ros_type
 
 if TYPE_CHECKING:
     from rosz.message import Message
-
-__all__ = ("AnySample", "Decoder", "MessageInfo", "Received")
+    from rosz.node.entity import Entity
 
 AnySample = Sample | Reply | FetchedSample | LocalSample
 """A sample, however it came."""
@@ -73,16 +74,9 @@ class _Publisher:
         self._before = 0
 
     def advance(self, sequence: int, *, replayed: bool) -> int | None:
-        """Go on to a sample of a publisher whose samples may be replayed.
+        """Return the number of samples missing before one; ``None`` if that is a repetition.
 
         A replay comes on a way of its own, and may overtake live samples that wait to be decoded.
-
-        Args:
-            sequence: The sequence number.
-            replayed: Whether it comes from the cache of the publisher.
-
-        Returns:
-            The number of samples missing before it; ``None`` if it is a repetition.
         """
         last, first, before = self.last, self._replayed, self._before
         if sequence <= last and (replayed or sequence >= first):
@@ -100,7 +94,7 @@ class _Publisher:
         return max(sequence - last - 1, 0) if last else 0
 
 
-class Decoder:
+class SampleDecoder:
     """Decode samples, count lost ones, and drop damaged and repeated ones.
 
     Args:
@@ -240,3 +234,91 @@ class Decoder:
             self._log.warning(
                 "dropping damaged samples on '%s' (told once): %.300s", self._topic, error
             )
+
+
+class TypeDecoders:
+    """The decoders of a subscription of any type, by the types of the samples.
+
+    Args:
+        subscription: The subscription.
+        report_lost: Function called with a type and its hash, and the number of samples that are
+            missing.
+        raw: Whether the encoded bytes are the messages.
+        with_info: Whether to make a `MessageInfo` for each message.
+    """
+
+    def __init__(
+        self,
+        subscription: Entity,
+        report_lost: Callable[[tuple[str, str], int], object],
+        *,
+        raw: bool,
+        with_info: bool,
+    ) -> None:
+        self._topic = subscription.name
+        self._context = subscription.node.context
+        self._log = subscription.node.log
+        self._report_lost = report_lost
+        self._raw = raw
+        self._with_info = with_info
+        self._decoders: dict[tuple[str, str], SampleDecoder | None] = {}
+        self._lock = threading.RLock()  # a signal handler may come in between
+
+    @property
+    def types(self) -> list[str]:
+        """The types received or seen so far, in the order of appearance."""
+        return list(dict.fromkeys(name for name, _ in list(self._decoders)))
+
+    def of_sample(self, sample: AnySample) -> SampleDecoder | None:
+        """Return the decoder for a sample whose key tells its type."""
+        *_, dds_name, type_hash = sample.key.split("/")
+        try:
+            return self.of_type(ros_type(dds_name), type_hash)
+        except DecodeError:
+            return None  # a key of Zenoh itself below the name of the topic
+
+    def of_type(self, type_name: str, type_hash: str) -> SampleDecoder | None:
+        """Return the decoder for a type; ``None``, after one warning, if it cannot be decoded."""
+        kind = (type_name, type_hash)
+        with self._lock:
+            if kind not in self._decoders:
+                self._decoders[kind] = self._find(*kind)
+            return self._decoders[kind]
+
+    def make(self, type_name: str, type_hash: str, message_type: type[Message]) -> SampleDecoder:
+        """Return a new decoder for messages of a class."""
+        return self._make(type_name, type_hash, None if self._raw else message_type)
+
+    def _find(self, type_name: str, type_hash: str) -> SampleDecoder | None:
+        if self._raw:
+            return self._make(type_name, type_hash, None)
+        try:
+            message_type: type[Message] = self._context.types.message(type_name)
+        except RoszError as error:
+            self._log.warning("cannot decode what comes on '%s': %s", self._topic, error)
+            return None
+        if type_hash not in {message_type._type_hash, NO_HASH}:
+            self._log.warning(
+                "cannot decode what comes on '%s': its definition of '%s' (%.15s…) is not the one"
+                " known here (%.15s…); put the sender's package on ROSZ_PACKAGE_PATH",
+                self._topic,
+                type_name,
+                type_hash,
+                message_type._type_hash,
+            )
+            return None
+        return self._make(type_name, type_hash, message_type)
+
+    def _make(
+        self, type_name: str, type_hash: str, message_type: type[Message] | None
+    ) -> SampleDecoder:
+        return SampleDecoder(
+            self._topic,
+            type_name,
+            type_hash,
+            None if message_type is None else self._context.decoder(message_type),
+            self._log,
+            partial(self._report_lost, (type_name, type_hash)),
+            message_type=message_type,
+            with_info=self._with_info,
+        )

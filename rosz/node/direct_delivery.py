@@ -9,8 +9,6 @@ from rosz.lifecycle import Closable, Registration
 from rosz.session import Sample, Session
 from rosz.wire import Token, is_rosz_id, own_key
 
-__all__ = ("DirectDelivery", "announcement_key", "direct_key", "own_direct_key")
-
 _SPACE = "inbox"
 _LARGE = "large"
 
@@ -35,7 +33,7 @@ def announcement_key(direct: str) -> str:
 
 
 class DirectDelivery:
-    """Receive what is sent to single subscriptions of a session.
+    """Receives the samples that are sent to single subscriptions of a session.
 
     Zenoh's subscribers are declared when the first subscription registers.
 
@@ -57,7 +55,7 @@ class DirectDelivery:
         receive: Callable[[Sample], None],
         announced: Callable[[Sample], None],
     ) -> Registration:
-        """Pass on what is sent to one subscription.
+        """Pass on the samples that are sent to one subscription.
 
         Args:
             entity_id: Number of the subscription.

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TypeVar
 
 import msgspec
 
 from rosz import names
 from rosz.errors import UsageError
-from rosz.lifecycle import Closable, Lifecycle, Registration
+from rosz.graph import Followed
+from rosz.lifecycle import Closable, Closing, Lifecycle, Registration
 from rosz.node.core import NodeCore
 from rosz.node.incompatible import COUNTERPARTS, IncompatibleEntities
+from rosz.qos import QoS
 from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid
-
-if TYPE_CHECKING:
-    from rosz.graph import Followed
-    from rosz.qos import QoS
-
-__all__ = ("ANY", "Entity")
 
 ANY = "*"
 """The type name and hash of an entity that receives every type."""
@@ -31,7 +27,7 @@ _DEEPEST = (1 << 63) - 1
 P = TypeVar("P", bound=Closable)
 
 
-class Entity:
+class Entity(Closing):
     """A publisher, subscription, service or client of a node.
 
     Args:
@@ -72,6 +68,7 @@ class Entity:
         self.qos: QoS = qos
         without_hash = context.environment.distro == "humble" and type_hash != ANY
         wire_hash = NO_HASH if without_hash else type_hash
+        names.check_length(type_name)
         self.key: str = entity_key(context.domain, names.check_resource(name), type_name, wire_hash)
         self.token: Token = Token(
             domain=context.domain,
@@ -164,16 +161,10 @@ class Entity:
             self.node.forget(self)
 
     def _finish(self) -> None:
-        """End what the entity runs, before its parts are closed."""
+        """End the work of the entity, before its parts are closed."""
 
     def _forked(self) -> None:
         """Replace locks in a forked child."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         state = " closed" if self.closed else ""
@@ -181,11 +172,7 @@ class Entity:
 
 
 def _with_depth(qos: QoS) -> QoS:
-    """Return a quality of service with a depth that all implementations can count to.
-
-    Raises:
-        UsageError: The depth is below 0.
-    """
+    """Return a quality of service with a depth that all implementations can count to."""
     if qos.depth < 0:
         raise UsageError(f"depth is {qos.depth}: expected 1 or more, or 0 for the system's choice")
     depth = min(qos.depth or _SYSTEM_DEPTH, _DEEPEST)

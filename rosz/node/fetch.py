@@ -5,7 +5,7 @@ slow link would hold up all other links. So a publisher keeps its newest samples
 and a subscription on another machine asks for one piece after the other. No piece waits for a link,
 so small samples pass between them, and a subscription that is slow or stopped delays nobody.
 
-The publisher announces again from time to time what a subscription has not fetched yet. So neither
+The publisher repeats its announcement until the subscription has fetched the samples. So neither
 a lost announcement nor a link that was cut loses a sample that is still kept.
 """
 
@@ -16,26 +16,20 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
 from rosz.errors import ClosedError, TransportError
+from rosz.graph import View
 from rosz.node.direct_delivery import announcement_key, direct_key, own_direct_key
-from rosz.session import Cancellation
-from rosz.wire import host_number
+from rosz.node.entity import Entity
+from rosz.session import Cancellation, Query, Queryable, Replies, Sample
+from rosz.wire import Token, host_number
 from rosz.worker import Worker
 
-if TYPE_CHECKING:
-    from rosz.graph import View
-    from rosz.node.entity import Entity
-    from rosz.session import Query, Queryable, Replies, Sample
-    from rosz.wire import Token
-
-__all__ = ("LARGE", "FetchableSamples", "FetchedSample", "Fetcher")
-
 LARGE = 1 << 15
-"""Bytes beyond which a sample is large; ten smaller ones fit into what a link buffers."""
+"""Bytes beyond which a sample is large; ten smaller ones fit into the buffer of a link."""
 _PIECE = 60_000
 """Bytes of one reply, which Zenoh sends in one batch of up to 65535 bytes."""
 _AT_ONCE = 2 * _PIECE
@@ -109,7 +103,10 @@ class FetchedSample(NamedTuple):
 
 
 def _source_key(key: str, zid: str, entity_id: int) -> str:
-    """Return the key of what a publisher keeps; who may receive a topic may query below its key."""
+    """Return the key of the kept samples of a publisher.
+
+    It lies below the key of the topic, which everybody who may receive the topic may query.
+    """
     return f"{key}/@adv/rosz/{zid}/{entity_id}"
 
 
@@ -143,7 +140,7 @@ class FetchableSamples:
         self._published = False
         self._kept: dict[int, tuple[bytes, bytes]] = {}
         self._bytes = 0
-        # What is being fetched, so that newer ones do not take its place.
+        # Samples that are being fetched, so that newer ones do not take their places.
         self._current: dict[str, tuple[int, bytes, bytes]] = {}
         # The number up to which a subscription needs nothing more, also while its link is cut.
         self._done: dict[str, int] = {}
@@ -184,7 +181,7 @@ class FetchableSamples:
 
     @property
     def to_publish(self) -> bool:
-        """Whether there are subscriptions of ROS 2, which receive only what is published."""
+        """Whether there are subscriptions of ROS 2, which receive only published samples."""
         self._look()
         return self._foreign
 
@@ -236,7 +233,9 @@ class FetchableSamples:
             self._wait_for_room()
         with self._lock:
             if self._queryable is None:
-                self._serve()
+                self._queryable = self._context.session.pull_queryable(self._key)
+                name, receive = f"rosz-samples{self._publisher.name}", self._queryable.receive
+                Worker(name, self._reply, receive=receive, threads=_THREADS)
             self._last = sequence
             self._published = published
             self._kept[sequence] = (payload, attachment)
@@ -263,11 +262,6 @@ class FetchableSamples:
             if self._bytes > _MOST_BYTES:
                 self._progress.wait(left)
 
-    def _serve(self) -> None:
-        self._queryable = queryable = self._context.session.pull_queryable(self._key)
-        name = f"rosz-samples{self._publisher.name}"
-        Worker(name, self._reply, receive=queryable.receive, threads=_THREADS)
-
     def _drop_oldest(self) -> None:
         sequence = next(iter(self._kept))
         self._bytes -= len(self._kept.pop(sequence)[0])
@@ -289,7 +283,7 @@ class FetchableSamples:
             self._context.session.put(announcement_key(key), _encode(announcement), block=False)
 
     def _announce_again(self) -> None:
-        """Announce what has not been fetched, until all has been."""
+        """Repeat the announcements until all samples have been fetched."""
         if not self.needed:
             self._announcing = False
             return
@@ -323,7 +317,7 @@ class FetchableSamples:
                 query.reply(self._key, piece, attachment=attachment)
 
     def _find(self, request: _Request) -> tuple[bytes, bytes]:
-        """Return the sample that is asked for, and note what the subscription has of it."""
+        """Return the requested sample, and note the progress of the subscription."""
         sequence, key = request.sequence, request.subscription
         with self._lock:
             current = self._current.get(key)
@@ -336,15 +330,12 @@ class FetchableSamples:
             elif payload:
                 self._current.pop(key, None)
                 self._done[key] = max(sequence, self._done.get(key, 0))
-                self._forget_fetched()
+                # Only samples that somebody still needs are kept.
+                waiting = (*self._far, *self._gone)
+                done = min((self._done.get(k, self._last) for k in waiting), default=self._last)
+                for number in [n for n in self._kept if n <= done]:
+                    self._bytes -= len(self._kept.pop(number)[0])
             return payload, attachment
-
-    def _forget_fetched(self) -> None:
-        """Keep only what somebody still needs."""
-        waiting = (*self._far, *self._gone)
-        done = min((self._done.get(key, self._last) for key in waiting), default=self._last)
-        for sequence in [n for n in self._kept if n <= done]:
-            self._bytes -= len(self._kept.pop(sequence)[0])
 
     def flush(self) -> dict[str, int]:
         """Wait until all samples have been fetched, or nobody fetches any more.
@@ -377,8 +368,8 @@ class Fetcher:
         subscription: The subscription, with the type of the publishers.
         depth: The number of newest samples that wait to be fetched; older ones are left out.
         receive: Function that gets each sample, and the GID of its publisher.
-        last: Function that gets the GID of a publisher, and returns the sequence number of what has
-            been received of it.
+        last: Function that gets the GID of a publisher, and returns the sequence number of its
+            latest sample that was received.
     """
 
     def __init__(
@@ -393,10 +384,10 @@ class Fetcher:
         self._receive = receive
         self._last = last
         self._cancel = Cancellation()
-        self._sources: dict[tuple[str, int], _Source] = {}
+        self._sources: dict[tuple[str, int], _FetchSource] = {}
 
     def announced(self, sample: Sample) -> None:
-        """Fetch what a publisher announces, on a thread for each publisher.
+        """Fetch the samples that a publisher announces, on a thread for each publisher.
 
         Called on a thread of the session.
         """
@@ -410,7 +401,7 @@ class Fetcher:
             self._forget_ended()
             key = _source_key(self._subscription.key, *place)
             gid = announcement.gid
-            source = _Source(
+            source = _FetchSource(
                 self._subscription,
                 key,
                 self._depth,
@@ -435,7 +426,7 @@ class Fetcher:
             source.close()
 
 
-class _Source:
+class _FetchSource:
     """One publisher, whose samples are fetched in their order."""
 
     def __init__(
@@ -474,7 +465,7 @@ class _Source:
         self._worker.close(0)
 
     def _fetch_all(self) -> None:
-        """Fetch what is wanted and kept, until nobody replies; an announcement begins it again."""
+        """Fetch the announced samples until nobody replies; an announcement begins it again."""
         try:
             while not self._worker.closed and (wanted := self._next()) is not None:
                 if not self._fetch(*wanted):
@@ -483,7 +474,9 @@ class _Source:
             return  # the subscription or the session is closed
 
     def _next(self) -> tuple[int, int] | None:
-        return next((one for one in self._wanted[-self._depth :] if one[0] > self._done), None)
+        return next(
+            (sample for sample in self._wanted[-self._depth :] if sample[0] > self._done), None
+        )
 
     def _fetch(self, sequence: int, size: int) -> bool:
         """Fetch a sample; return false if nobody replies."""

@@ -6,8 +6,6 @@ import logging
 
 from rosz.wire import NO_HASH, Kind, Token
 
-__all__ = ("COUNTERPARTS", "IncompatibleEntities", "explain_incompatible")
-
 COUNTERPARTS = {
     Kind.PUBLISHER: Kind.SUBSCRIPTION,
     Kind.SUBSCRIPTION: Kind.PUBLISHER,

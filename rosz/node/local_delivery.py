@@ -1,7 +1,7 @@
 """Messages between the nodes of one process, which do not pass through the session.
 
 A publisher of a container gives its messages to the subscriptions of its process itself, and the
-session sends them only to others. What it gives is the message, or its bytes, from which each
+session sends them only to others. It gives them the message, or its bytes, from which each
 subscription decodes a message of its own.
 
 Latched messages of the past come from the session here too, as between processes.
@@ -17,8 +17,6 @@ import msgspec
 
 from rosz.lifecycle import Registration
 from rosz.wire import Token
-
-__all__ = ("LocalDelivery", "LocalReceiver", "LocalSample")
 
 
 class LocalSample(msgspec.Struct, gc=False):
@@ -59,7 +57,7 @@ class LocalReceiver(NamedTuple):
     """A subscription, as publishers of its process see it.
 
     Attributes:
-        matches: Function that returns whether it receives what a publisher sends.
+        matches: Function that returns whether it receives the samples of a publisher.
         receive: Function that takes a sample; it returns soon.
         expect_replay: Function called with the GID of each latching publisher.
     """
@@ -94,7 +92,9 @@ class LocalDelivery:
 
         def unregister() -> None:
             with self._lock:
-                left = tuple(one for one in self._receivers.get(topic, ()) if one is not receiver)
+                left = tuple(
+                    other for other in self._receivers.get(topic, ()) if other is not receiver
+                )
                 self._receivers[topic] = left
                 if not left:
                     del self._receivers[topic]
@@ -103,6 +103,6 @@ class LocalDelivery:
         return Registration(unregister)
 
     def find(self, publisher: Token) -> tuple[LocalReceiver, ...]:
-        """Return the subscriptions that receive what a publisher sends."""
-        known = self._receivers.get(publisher.name, ())
-        return tuple(receiver for receiver in known if receiver.matches(publisher))
+        """Return the subscriptions that receive the samples of a publisher."""
+        receivers = self._receivers.get(publisher.name, ())
+        return tuple(receiver for receiver in receivers if receiver.matches(publisher))

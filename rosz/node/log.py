@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import TypedDict, Unpack, cast
+from typing import Any, TypedDict, Unpack, cast
 
 from rosz.errors import NotFoundError, near_miss
 from rosz.node.clock import Clock, nanoseconds
@@ -33,8 +33,6 @@ from rosz.node.log_handlers import (
     parse_severity,
     severity_name,
 )
-
-__all__ = ("LogOptions", "LoggerTree", "NodeLog", "NodeLogger")
 
 _BASE = "rosout"
 
@@ -79,7 +77,7 @@ class NodeLogger(logging.Logger):
 
     def __init__(self, name: str, level: int = logging.NOTSET) -> None:
         super().__init__(name, level)
-        # What was logged where and when; a signal handler may interrupt the thread that holds it.
+        # Times and texts by place; a signal handler may interrupt the thread that holds it.
         self._lock = threading.RLock()
         self._times: dict[_Site, int] = {}
         self._texts: dict[_Site, str] = {}
@@ -100,6 +98,7 @@ class NodeLogger(logging.Logger):
         if self.isEnabledFor(logging.WARNING):
             self._log(logging.WARNING, msg, args, **options)
 
+    # An alias would have an ambiguous type: Python's Logger has two methods, too.
     def warn(self, msg: object, *args: object, **options: Unpack[LogOptions]) -> None:
         """Log something unexpected that does not stop the work."""
         if self.isEnabledFor(logging.WARNING):
@@ -175,27 +174,36 @@ class NodeLogger(logging.Logger):
         extra: Mapping[str, object] | None = None,
         stack_info: bool = False,
         stacklevel: int = 1,
+        **limits: Any,
+    ) -> None:
+        if not (limits and self._is_left_out(_caller(stacklevel), msg, args, **limits)):
+            super()._log(level, msg, args, exc_info, extra, stack_info, stacklevel)
+
+    def _is_left_out(
+        self,
+        frame: FrameType,
+        msg: object,
+        args: tuple[object, ...],
+        *,
         once: bool = False,
         throttle: float | None = None,
         throttle_identical: float | None = None,
-    ) -> None:
-        if once or throttle is not None or throttle_identical is not None:
-            frame = _caller(stacklevel)
-            site = (frame.f_code.co_filename, frame.f_lineno, frame.f_lasti)
-            text = "" if throttle_identical is None else _text(msg, args)
-            with self._lock:
-                if once:
-                    if site in self._seen:
-                        return
-                    self._seen.add(site)
-                if throttle is not None and not self._elapsed(site, throttle):
-                    return
-                if throttle_identical is not None:
-                    elapsed = self._elapsed(site, throttle_identical)
-                    last, self._texts[site] = self._texts.get(site), text
-                    if last == text and not elapsed:
-                        return
-        super()._log(level, msg, args, exc_info, extra, stack_info, stacklevel)
+    ) -> bool:
+        site = (frame.f_code.co_filename, frame.f_lineno, frame.f_lasti)
+        # Before the lock: an argument may log while it is formatted.
+        text = "" if throttle_identical is None else _text(msg, args)
+        with self._lock:
+            if once:
+                if site in self._seen:
+                    return True
+                self._seen.add(site)
+            if throttle is not None and not self._elapsed(site, throttle):
+                return True
+            if throttle_identical is None:
+                return False
+            elapsed = self._elapsed(site, throttle_identical)
+            last, self._texts[site] = self._texts.get(site), text
+            return last == text and not elapsed
 
     def _elapsed(self, site: _Site, seconds: float) -> bool:
         """Return whether the last time is more than a period ago, or later than now."""
@@ -372,10 +380,10 @@ class NodeLog(NodeLogger):
         local = name.removeprefix(self._ros_name).strip(".") if is_ros_name else name
         logger = loggers.get(local or _BASE) or loggers.get(f"{_BASE}.{local}")
         if logger is None:
-            known = ", ".join(sorted(loggers))
+            names = ", ".join(sorted(loggers))
             hint = near_miss(name, loggers)
             raise NotFoundError(
-                f"{self.node} has no logger '{name}': expected one of {known}{hint}"
+                f"{self.node} has no logger '{name}': expected one of {names}{hint}"
             )
         logger.setLevel(parse_severity(level))
 

@@ -22,21 +22,6 @@ from rosz.errors import ClosedError, UsageError, near_miss
 from rosz.node.clock import Clock
 from rosz.worker import Worker
 
-__all__ = (
-    "BACKUPS",
-    "DEFAULT_FORMAT",
-    "MAX_BYTES",
-    "ConsoleHandler",
-    "FileHandler",
-    "LogHandler",
-    "PublishLine",
-    "RosoutHandler",
-    "log_file_name",
-    "parse_severity",
-    "severity",
-    "severity_name",
-)
-
 _NAMES = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
 """Severity to name; the numbers are those of rcl_interfaces/Log."""
 
@@ -62,7 +47,7 @@ BACKUPS = 4
 _FILE_FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
 _CUT = b" [cut]\n"
 
-_CAPACITY = 1000
+_CAPACITY = 1000  # as many lines as the publisher of /rosout keeps for late subscriptions
 _DRAIN_TIMEOUT = 1.0
 
 PublishLine = Callable[[int, str, str, str, str, int, int], object]
@@ -179,19 +164,11 @@ class ConsoleHandler(LogHandler):
 
 
 def _compile_format(text_format: str, node: str, clock: Clock) -> list[_Part]:
-    """Split a format into functions that each make a part of the line.
+    """Split a format into functions of a record and its message, each for a part of the line.
 
     The tokens are ROS 1's: ``${severity}``, ``${message}``, ``${time}``, ``${walltime}``, either of
     these with a strftime format as in ``${time:%H:%M}``, ``${thread}``, ``${logger}``, ``${file}``,
     ``${line}``, ``${function}``, ``${node}``. Other text is written as it is.
-
-    Args:
-        text_format: The format.
-        node: Full name of the node.
-        clock: Clock of the node.
-
-    Returns:
-        Functions of a record and its formatted message.
     """
     tokens: dict[str, _Part] = {
         "severity": lambda record, _: severity_name(record.levelno),
@@ -233,7 +210,7 @@ def _strftime(time_format: str, clock: Clock, token: str) -> _Part | None:
 
 
 def _ros_time(clock: Clock) -> str:
-    """Return what ROS 1 adds to wall time in simulation: a comma and ROS time in seconds."""
+    """Return ROS 1's suffix of wall time in simulation: a comma and ROS time in seconds."""
     if not clock.simulated:
         return ""
     seconds, nanoseconds = divmod(clock.now(), _SECOND)

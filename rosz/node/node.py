@@ -1,4 +1,4 @@
-"""Nodes: what a program is to the rest of the network."""
+"""Nodes: what a program is to the rest of the network, by itself or through a bridge."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
+from rosz import names
 from rosz.errors import ClosedError
 from rosz.interrupts import InterruptDeferral
-from rosz.node import control, signals, standard, takeover
+from rosz.node import control, signals, standard
 from rosz.node.client import Client
 from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
 from rosz.node.core import NodeCore
 from rosz.node.publisher import Publisher
-from rosz.node.ros2_detector import Ros2PeerDetector
+from rosz.node.ros2.detector import Ros2PeerDetector
 from rosz.node.service import Service
 from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Rate, Timer, TimerEvent
@@ -24,10 +25,8 @@ from rosz.qos import SERVICES, QoS, for_queue
 if TYPE_CHECKING:
     from rosz.message import Action, Message
     from rosz.message import Service as ServiceType
-    from rosz.node.action_client import ActionClient
-    from rosz.node.action_server import ActionServer, Policy, ServerGoal
-
-__all__ = ("Node",)
+    from rosz.node.actions.client import ActionClient
+    from rosz.node.actions.server import ActionServer, Policy, ServerGoal
 
 M = TypeVar("M", bound="Message")
 
@@ -77,7 +76,7 @@ class Node(NodeCore):
     def _begin(self) -> None:
         standard.set_initial_params(self)
         control.serve_control(self)
-        takeover.yield_to_newer(self)
+        control.yield_to_newer(self)
         self._announce()
         if not self.context.passing:
             standard.follow_clock(self)
@@ -186,7 +185,9 @@ class Node(NodeCore):
             callback: Function that gets each message, on a thread of the subscription, one at a
                 time. Without one, iterate over the subscription or call its ``get``.
             queue_size: Number of newest samples that wait for their turn; older ones are dropped.
-            qos: Quality of service instead of ``queue_size``.
+            qos: Quality of service instead of ``queue_size``. With a volatile one, the subscription
+                does not get what latching publishers have kept, as in ROS 2; without any it does,
+                as in ROS 1.
             raw: Whether to pass on the encoded bytes.
             with_info: Whether the callback also gets a `MessageInfo`.
 
@@ -197,14 +198,19 @@ class Node(NodeCore):
             DefinitionError: A definition in the package of the type is not well-formed.
             ClosedError: The node is closed.
         """
-        name, qos = self.resolve(topic), qos or for_queue(queue_size)
+        name, history = self.resolve(topic), qos is None
+        qos = qos or for_queue(queue_size)
         if message_type is None:
             return self.keep(
-                GenericSubscription(self, name, callback, qos, raw=raw, with_info=with_info)
+                GenericSubscription(
+                    self, name, callback, qos, raw=raw, with_info=with_info, history=history
+                )
             )
         kind = self._message_class(message_type)
         return self.keep(
-            Subscription(self, name, kind, callback, qos, raw=raw, with_info=with_info)
+            Subscription(
+                self, name, kind, callback, qos, raw=raw, with_info=with_info, history=history
+            )
         )
 
     def service(
@@ -290,21 +296,10 @@ class Node(NodeCore):
             UsageError: The policy is none of these.
             ClosedError: The node is closed.
         """
-        from rosz.node.action_server import ActionServer
+        from rosz.node.actions.server import ActionServer, ServerOptions
 
-        return self.keep(
-            ActionServer(
-                self,
-                self.resolve(name),
-                action_type,
-                execute,
-                goal=goal,
-                cancel=cancel,
-                policy=policy,
-                keep_results=keep_results,
-                most_results=most_results,
-            )
-        )
+        options = ServerOptions(goal, cancel, policy, keep_results, most_results)
+        return self.keep(ActionServer(self, self.resolve(name), action_type, execute, options))
 
     def action_client(self, name: str, action_type: type[Action]) -> ActionClient:
         """Make a client of an action.
@@ -317,7 +312,7 @@ class Node(NodeCore):
             InvalidName: The name is not legal.
             ClosedError: The node is closed.
         """
-        from rosz.node.action_client import ActionClient
+        from rosz.node.actions.client import ActionClient
 
         return self.keep(ActionClient(self, self.resolve(name), action_type))
 
@@ -391,3 +386,47 @@ class Node(NodeCore):
         if isinstance(message_type, str):
             return self.context.types.message(message_type)
         return message_type
+
+
+class BridgedNode(NodeCore):
+    """A node that lives elsewhere, and whose entities a bridge declares.
+
+    A request to shut it down, from a command or since a newer node has its name, goes to the node.
+
+    Args:
+        context: The context of the bridge.
+        name: Full name.
+        terminate: Function that asks the node to end, for a reason.
+        number: Number of the node within the session; by default one that was never used.
+        started: Time of its start that its token tells, as that of the node that had the number
+            before; now by default.
+
+    Raises:
+        InvalidName: The name is not legal.
+        ClosedError: The context is shut down.
+    """
+
+    def __init__(
+        self,
+        context: Context,
+        name: str,
+        terminate: Callable[[str], object],
+        number: int | None = None,
+        started: int | None = None,
+    ) -> None:
+        self._terminate = terminate
+        namespace = names.namespace(name).rstrip("/") or "/"
+        base = names.basename(name)
+        super().__init__(base, namespace=namespace, context=context, number=number, started=started)
+        control.serve_control(self)
+        control.yield_to_newer(self)
+        self._announce()
+
+    def shutdown(self, reason: str = "") -> None:
+        """Ask the node to end; it disappears when it has."""
+        if not self._lifecycle.closing:
+            self._terminate(reason)
+
+    def close(self) -> None:
+        """Take the node from the network."""
+        self._end("")

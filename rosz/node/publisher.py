@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
+from enum import Enum
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rosz.errors import ClosedError, EncodeError
@@ -15,19 +15,30 @@ from rosz.node.core import NodeCore
 from rosz.node.direct_delivery import direct_key
 from rosz.node.entity import Entity
 from rosz.node.fetch import LARGE, FetchableSamples
-from rosz.node.local_delivery import LocalReceiver, LocalSample
+from rosz.node.local_delivery import LocalDelivery, LocalReceiver, LocalSample
 from rosz.qos import QoS
+from rosz.queue import BoundedQueue
 from rosz.wire import Kind, Token, pack_attachment
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
 
-__all__ = ("Publisher", "SubscriberLink")
-
 M = TypeVar("M", bound="Message")
-_Held = tuple[int, bytes, bytes]
+_WaitingSample = tuple[int, bytes, bytes]
 """The sequence number, payload and attachment of a sample."""
+
+
+class _State(Enum):
+    """The state of a publisher, which decides what becomes of a sample."""
+
+    HELD = "samples wait until the links are up, or until the subscriptions are known"
+    DIRECT = "small samples need nothing but to be published"
+    FETCHED = "subscriptions fetch large samples, which small ones must not overtake"
+    CLOSED = "the publisher was inherited by a forked child"
+
+
+_DIRECT = _State.DIRECT  # looked up for each sample, which is slow in the class of an enum
 
 _HELD_SAMPLES = 1000
 _HELD_BYTES = 64 << 20
@@ -133,13 +144,12 @@ class Publisher(Entity, Generic[M]):
         if qos.reliable:
             depth = None if self._blocks else qos.depth
             self._fetchable = self.keep(FetchableSamples(self, depth, self._report_dropped))
+        self._direct_bytes = sys.maxsize if self._fetchable is None else LARGE
+        self._waiting: BoundedQueue[_WaitingSample] = BoundedQueue(_HELD_SAMPLES, _HELD_BYTES)
         linked = node.context.mesh.linked.is_set()
-        self._held: deque[_Held] | None = None if linked else deque()
-        self._held_bytes = 0
-        self._fetching = False
-        self._small = self._largest_small()
+        self._state = _State.DIRECT if linked else _State.HELD
         self.announce()
-        if self._held is not None:
+        if not linked:
             node.context.mesh.when_linked(self._release)
 
     @property
@@ -161,7 +171,7 @@ class Publisher(Entity, Generic[M]):
         if self._local is None:
             self._send(self._encode(message))
         else:
-            self._deliver(message, None)
+            self._deliver(self._local, message, None)
 
     def publish_raw(self, payload: bytes | bytearray | memoryview) -> None:
         """Send an encoded message.
@@ -188,48 +198,38 @@ class Publisher(Entity, Generic[M]):
         if self._local is None:
             self._send(payload)
         else:
-            self._deliver(None, payload)
+            self._deliver(self._local, None, payload)
 
-    def _deliver(self, message: Any, payload: bytes | None) -> None:
-        """Give a message to the subscriptions of this process, and send it if others need it.
-
-        Args:
-            message: The message, or None if there are only bytes.
-            payload: The bytes, or None if the message is not encoded yet.
-        """
-        local = self._local
-        if local is not None and local.version != self._receivers_version:
-            self._find_receivers()
+    def _deliver(self, local: LocalDelivery, message: Any, payload: bytes | None) -> None:
+        """Give a message to the subscriptions of this process, and send it if others need it."""
+        if local.version != self._receivers_version:
+            self._find_receivers(local)
         with self._ordered:
             if self._lifecycle.closing:
                 self.check_open("publish")
-            receivers = self._receivers
-            # The links are up where small samples may be put as they are.
-            sent = self._small < 0 or self._latched or self._raw.matched
+            sent = self._state is not _DIRECT or self._latched or self._raw.matched
             if payload is None and (sent or self._copies):
                 payload = self._encode(message)
             if sent and payload is not None:
                 self._send(payload)
-                sequence = self._sequence
             else:
-                self._sequence = sequence = self._sequence + 1
-            if not receivers:
-                return
-            if self._copies:
-                message = None
-            elif self._has_header and message is not None:
-                message.header.seq = sequence
-            sample = LocalSample(
-                self.key, sequence, time.time_ns(), self.gid, message, payload or self._encode
-            )
-            for receiver in receivers:
-                receiver.receive(sample)
+                self._sequence += 1
+            if self._receivers:
+                self._pass_on(message, payload)
 
-    def _find_receivers(self) -> None:
-        """Find the subscriptions of this process."""
-        local = self._local
-        if local is None:
-            return
+    def _pass_on(self, message: Any, payload: bytes | None) -> None:
+        """Give the message that has just been numbered to the subscriptions of this process."""
+        if self._copies:
+            message = None
+        elif self._has_header and message is not None:
+            message.header.seq = self._sequence
+        encoded = payload or self._encode
+        now = time.time_ns()
+        sample = LocalSample(self.key, self._sequence, now, self.gid, message, encoded)
+        for receiver in self._receivers:
+            receiver.receive(sample)
+
+    def _find_receivers(self, local: LocalDelivery) -> None:
         self._receivers_version = local.version
         self._receivers = local.find(self.token)
         if self.qos.latched:
@@ -240,45 +240,35 @@ class Publisher(Entity, Generic[M]):
         with self._ordered:
             self._sequence = sequence = self._sequence + 1
             attachment = pack_attachment(sequence, time.time_ns(), self.gid)
-            if len(payload) <= self._small:
+            if self._state is _DIRECT and len(payload) <= self._direct_bytes:
                 self._put(payload, attachment)
             else:
                 self.check_open("publish")
                 self._send_with_care(sequence, payload, attachment)
 
-    def _largest_small(self) -> int:
-        """Return the size in bytes up to which samples need nothing but to be published."""
-        if self._held is not None or self._fetching:
-            return -1  # small ones must not overtake large ones
-        return sys.maxsize if self._fetchable is None else LARGE
-
     def _send_with_care(self, sequence: int, payload: bytes, attachment: bytes) -> None:
         """Send a sample that is large, or comes after a large one, or before the links are up."""
-        fetchable = self._fetchable
-        if self._held is not None:
-            self._hold(self._held, (sequence, payload, attachment))
-        elif fetchable is None or not (self._fetching or len(payload) > LARGE):
+        fetchable, small = self._fetchable, len(payload) <= self._direct_bytes
+        if self._state is _State.HELD:
+            self._hold(sequence, payload, attachment)
+        elif fetchable is None or (small and self._state is _DIRECT):
             self._put(payload, attachment)
         elif fetchable.undecided:
-            self._held = deque()
-            self._small = -1
-            self._hold(self._held, (sequence, payload, attachment))
+            self._state = _State.HELD
+            self._hold(sequence, payload, attachment)
             fetchable.when_decided(self._release)
         else:
-            self._fetching = fetchable.needed
-            self._small = self._largest_small()
-            published = not self._fetching or self.qos.latched or fetchable.to_publish
+            needed = fetchable.needed
+            self._state = _State.FETCHED if needed else _State.DIRECT
+            published = not needed or self.qos.latched or fetchable.to_publish
             if published:
                 self._put(payload, attachment)
-            if self._fetching:
+            if needed:
                 fetchable.send(sequence, payload, attachment, published=published)
 
-    def _hold(self, held: deque[_Held], sample: _Held) -> None:
+    def _hold(self, sequence: int, payload: bytes, attachment: bytes) -> None:
         """Hold a sample; the newest are kept where there are too many."""
-        held.append(sample)
-        self._held_bytes += len(sample[1])
-        while len(held) > _HELD_SAMPLES or (self._held_bytes > _HELD_BYTES and len(held) > 1):
-            self._held_bytes -= len(held.popleft()[1])
+        for _ in self._waiting.put((sequence, payload, attachment), len(payload)):
             if not self.dropped:
                 self.node.log.warning(
                     "dropping messages on '%s': until this process is linked to all others, only"
@@ -335,19 +325,22 @@ class Publisher(Entity, Generic[M]):
             ) from error
 
     def _release(self) -> None:
-        """Send the held samples, in order, and hold no more."""
+        """Send the samples that wait, in order, and hold no more."""
         with self._ordered:
-            held, self._held, self._held_bytes = self._held, None, 0
-            self._small = self._largest_small()
-            for sample in held or ():
+            if self._state is not _State.HELD:
+                return
+            self._state = _State.DIRECT
+            samples = list(self._waiting)
+            self._waiting.clear()
+            for sample in samples:
                 self._send_with_care(*sample)
 
     def _finish(self) -> None:
         context = self.node.context
-        if self._held:
+        if self._waiting:
             context.mesh.linked.wait(context.HOLD_TIMEOUT)
             self._release()
-        if self._held and self._fetchable is not None:  # a subscription has just appeared
+        if self._waiting and self._fetchable is not None:  # a subscription has just appeared
             decided = threading.Event()
             self._fetchable.when_decided(decided.set)
             decided.wait(context.HOLD_TIMEOUT)
@@ -367,8 +360,8 @@ class Publisher(Entity, Generic[M]):
 
     def subscribers(self) -> list[Token]:
         """Return the subscriptions that this publisher reaches: same topic, type and hash."""
-        found = self.others.view().subscriptions(self.name)
-        return [token for token in found if self.matches(token)]
+        subscriptions = self.others.view().subscriptions(self.name)
+        return [token for token in subscriptions if self.matches(token)]
 
     @property
     def heard(self) -> bool:
@@ -377,7 +370,7 @@ class Publisher(Entity, Generic[M]):
         Raises:
             ClosedError: The publisher is closed.
         """
-        if self._held is not None or self.qos.latched:
+        if self._state in {_State.HELD, _State.CLOSED} or self.qos.latched:
             return True
         far = self._fetchable is not None and self._fetchable.needed
         return far or self._raw.matched
@@ -442,5 +435,4 @@ class Publisher(Entity, Generic[M]):
 
     def _forked(self) -> None:
         self._ordered = threading.RLock()
-        self._small = -1
-        self._held = deque()  # so that `publish` checks whether the publisher is open
+        self._state = _State.CLOSED

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from rosz.message import Message
     from rosz.message import Service as ServiceType
 
-__all__ = ("Call", "CallService", "Service", "to_response")
-
 _NO_GID = bytes(16)
 
 
@@ -64,11 +62,7 @@ class Service(Entity):
         self.announce()
 
     def _open(self, threads: int) -> None:
-        """Receive requests from now on.
-
-        Raises:
-            UsageError: The number of threads is below 1.
-        """
+        """Receive requests from now on."""
         if not isinstance(threads, int) or threads < 1:
             raise UsageError(f"threads is {threads!r}: expected 1 or more")
         session = self.node.context.session

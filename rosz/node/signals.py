@@ -26,8 +26,6 @@ from rosz.lifecycle import Lifecycle
 from rosz.node.context import Context
 from rosz.worker import start_thread
 
-__all__ = ("install", "of_program")
-
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_FD = -1
 _SOON = 0.05
@@ -42,14 +40,14 @@ def install(context: Context) -> None:
     Nothing happens outside the main thread, or for a signal that has another handler already. A
     signal that is ignored is taken too: shells start background jobs of a script like that, and
     ``kill -INT`` must end them nevertheless, as it ends nodes of rospy. A signal that finds all
-    contexts shut down does what it would do without rosz.
+    contexts shut down has the effect that it has without rosz.
 
-    Where a person types Python, Ctrl-C interrupts what was typed, and nodes stay open.
+    Where a person types Python, Ctrl-C interrupts the typed statement, and nodes stay open.
     """
     if threading.current_thread() is not threading.main_thread():
         return
     handlers = [signal.getsignal(number) for number in _SIGNALS]
-    handlers = [one.replaced if isinstance(one, InterruptDeferral) else one for one in handlers]
+    handlers = [h.replaced if isinstance(h, InterruptDeferral) else h for h in handlers]
     for present in handlers:
         if isinstance(present, _Handler):
             present.add(context)
@@ -115,7 +113,7 @@ class _Handler:
             raise SystemExit(128 + number)
 
     def restore(self, number: int) -> None:
-        """Restore what a signal does without rosz."""
+        """Restore the effect that a signal has without rosz."""
         if self._is_watching():
             signal.set_wakeup_fd(_NO_FD)
         default = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL

@@ -14,8 +14,6 @@ from rosz.node.subscription import Subscription
 from rosz.qos import CLOCK, ROSOUT, SERVICES
 from rosz.worker import start_thread
 
-__all__ = ("follow_clock", "open_rosout", "serve_loggers", "set_initial_params", "simulate")
-
 _SECOND = 1_000_000_000
 _THREADS = 16
 
@@ -103,7 +101,7 @@ def _open_rosout(node: NodeCore) -> None:
 
 
 def _valid(text: str) -> str:
-    """Return a text with escapes for what no message can hold, such as bytes of a file's name."""
+    """Return a text with escapes for bytes that no message can hold, as in the name of a file."""
     return text.encode(errors="backslashreplace").decode().replace("\0", "\\x00")
 
 

@@ -17,26 +17,23 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from rosz.errors import ClosedError, DecodeError, RoszError, WaitTimeout
 from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
-from rosz.node.decoder import AnySample, Decoder, Received
+from rosz.node.decoder import AnySample, Received, SampleDecoder, TypeDecoders
 from rosz.node.entity import ANY, Entity
 from rosz.node.fetch import FetchedSample, Fetcher
 from rosz.node.local_delivery import LocalReceiver, LocalSample
 from rosz.program import within
-from rosz.qos import QoS
-from rosz.session import LONGEST_WAIT, Reply, clamp_timeout
-from rosz.wire import NO_HASH, Kind, Token, entity_key, format_token, gid, read_attachment, ros_type
+from rosz.qos import FOREVER, QoS
+from rosz.session import LONGEST_WAIT, PullSubscriber, Reply, Sample, clamp_timeout
+from rosz.wire import Kind, Token, entity_key, format_token, gid, read_attachment
 from rosz.worker import Worker
 
 if TYPE_CHECKING:
     from rosz.message import Message
-    from rosz.session import PullSubscriber, Sample
-
-__all__ = ("GenericSubscription", "Subscription")
 
 M = TypeVar("M")
 
@@ -55,8 +52,57 @@ _YIELD_AFTER = 100
 """Messages after which a publisher of the same process yields at most."""
 
 
-_Item = tuple[AnySample, Decoder | None]
+_Item = tuple[AnySample, SampleDecoder | None]
 """A sample, with its decoder if its key does not tell its type."""
+
+
+class _History:
+    """Passes on the replies of latching publishers from a time on.
+
+    Of what is older it passes on the last sample of each publisher at the end, if that is lasting.
+    """
+
+    def __init__(self, receive: Callable[[Reply], None], since: int, *, lasting: bool) -> None:
+        self._receive = receive
+        self._since = since
+        self._lasting = lasting
+        self._older: dict[bytes, tuple[int, Reply]] = {}
+
+    def take(self, reply: Reply) -> None:
+        sequence, stamp, publisher = 0, self._since, b""
+        if self._since and reply.attachment is not None:
+            with suppress(DecodeError):  # whoever decodes the sample reports it
+                sequence, stamp, publisher = read_attachment(reply.attachment)
+        if stamp >= self._since:
+            self._receive(reply)
+        elif sequence >= self._older.get(publisher, (0, reply))[0]:
+            self._older[publisher] = sequence, reply
+
+    def finish(self) -> None:
+        for _, reply in self._older.values() if self._lasting else ():
+            self._receive(reply)
+
+
+class _WantedHistory(NamedTuple):
+    """The kept samples of latching publishers that a subscription requests.
+
+    Attributes:
+        wanted: Whether it requests any.
+        since: Time of the oldest sample that it requests, in nanoseconds; 0 for all.
+        opened: Time when the subscription was made, in nanoseconds.
+    """
+
+    wanted: bool
+    since: int
+    opened: int
+
+    def start(self, *, lasting: bool) -> int:
+        """Return the time of the oldest sample that it requests.
+
+        Args:
+            lasting: Whether the samples of the publisher have no lifespan.
+        """
+        return self.since or (0 if lasting else self.opened)
 
 
 class Subscription(Entity, Generic[M]):
@@ -71,13 +117,17 @@ class Subscription(Entity, Generic[M]):
         topic: Resolved name of the topic.
         message_type: Class of the messages; any type when not given.
         callback: Function that gets each message, and its info if ``with_info``.
-        qos: The depth of the queue, and what is asked of publishers.
+        qos: The depth of the queue, and the requested quality of service.
         raw: Whether to pass on the encoded bytes instead of messages.
         with_info: Whether the callback also gets a `MessageInfo`.
         warn_dropped: Whether the first sample that is dropped is logged.
         fit: Function that returns how many samples of a size in bytes may wait for the callback,
             where these are fewer than the depth; only without a message type.
+        history: Whether it gets the kept samples of latching publishers although the QoS is
+            volatile. ROS 1 has no durability: there every subscription gets them.
         number: Number of the subscription within the session; by default one that was never used.
+        history_from: Time from which on all is received that latching publishers hold, and of what
+            is older the last message only; 0 for all.
 
     Attributes:
         message_type: As given.
@@ -97,7 +147,9 @@ class Subscription(Entity, Generic[M]):
         with_info: bool = False,
         warn_dropped: bool = True,
         fit: Callable[[int], int] | None = None,
+        history: bool = True,
         number: int | None = None,
+        history_from: int = 0,
     ) -> None:
         name, type_hash = ANY, ANY
         if message_type is not None:
@@ -107,60 +159,50 @@ class Subscription(Entity, Generic[M]):
         self.message_type = message_type
         self.dropped: int = 0
         self._callback = callback
-        self._raw = raw
         self._with_info = with_info
         self._warn_dropped = warn_dropped
-        self._fit = fit
+        self._history = _WantedHistory(history or qos.latched, history_from, time.time_ns())
         self._depth = _ALL if qos.history == "keep_all" else min(qos.depth, _MOST)
         self._queue = _Queue(self._depth)
         self._queue_worker: Worker[_Item] | None = None
         self._turn = threading.RLock()
-        self._unyielding = 0
-        self._turn_after = max(self._depth, _YIELD_AFTER)
-        self._opened = time.time_ns()
-        self._learning = threading.RLock()  # a signal handler may come in between
-        self._decoder = None
-        self._decoders: dict[tuple[str, str], Decoder | None] = {}
+        self._until_yield = max(self._depth, _YIELD_AFTER)
+        self._making = threading.RLock()  # a signal handler may come in between
+        self._decoders = TypeDecoders(self, self._report_lost, raw=raw, with_info=with_info)
+        self._decoder: SampleDecoder | None = None
         self._announced: dict[tuple[str, str], Entity] = {}
         if message_type is not None:
-            self._decoder = self._make_decoder(name, type_hash, None if raw else message_type)
-        self._open()
+            self._decoder = self._decoders.make(name, type_hash, message_type)
+        self._open(fit)
 
-    def _open(self) -> None:
+    def _open(self, fit: Callable[[int], int] | None) -> None:
         """Begin to receive, and announce the subscription if its type is known."""
-        self._receive_locally()
-        typed, latched = self._decoder is not None, self.qos.latched
+        local, decoder = self.node.context.local_delivery, self._decoder
+        if local is not None:
+            expect_replay = decoder.expect_replay if decoder is not None else lambda _: None
+            receiver = LocalReceiver(self.matches, self._receive_message, expect_replay)
+            self.keep(local.register(self.name, receiver))
+        typed, latched = decoder is not None, self.qos.latched
         self._subscribe(
+            fit,
             history=self.qos.depth if typed and latched else 0,
             recover=typed and latched and self.qos.reliable,
         )
         if self._decoder is not None:
             self._receive_directly(self, self._decoder)
             self.announce()
-        if not (typed and latched):
+        if not typed or (self._history.wanted and not latched):
             self.keep(Registration(self.others.listen(self._follow)))
 
-    def _receive_locally(self) -> None:
-        """Receive what nodes of this process publish, where that does not use the session."""
-        local = self.node.context.local_delivery
-        if local is not None:
-            receiver = LocalReceiver(self.matches, self._receive_message, self._expect_replay)
-            self.keep(local.register(self.name, receiver))
-
-    def _expect_replay(self, publisher: bytes) -> None:
-        """Expect samples of a publisher with this subscription's type twice."""
-        if self._decoder is not None:
-            self._decoder.expect_replay(publisher)
-
-    def _subscribe(self, *, history: int, recover: bool) -> None:
+    def _subscribe(self, fit: Callable[[int], int] | None, *, history: int, recover: bool) -> None:
         session = self.node.context.session
         if self._callback is None:
             self.keep(session.subscriber(self.key, self._receive, history=history, recover=recover))
             return
-        if self._fit is None:
+        if fit is None:
             ring = session.pull_subscriber(self.key, self._depth, history=history, recover=recover)
         else:
-            ring = session.bounded_subscriber(self.key, self._depth, self._fit)
+            ring = session.bounded_subscriber(self.key, self._depth, fit)
         self.keep(ring)
         Worker(f"rosz-sub{self.name}", self._dispatch, receive=partial(_next_sample, ring))
 
@@ -169,7 +211,7 @@ class Subscription(Entity, Generic[M]):
         """The types received or seen so far, as ``pkg/msg/Name``, in the order of appearance."""
         if self.message_type is not None:
             return [self.token.type_name]
-        return list(dict.fromkeys(name for name, _ in list(self._decoders)))
+        return self._decoders.types
 
     def matches(self, token: Token) -> bool:
         """Return whether this subscription receives what a publisher sends."""
@@ -179,21 +221,16 @@ class Subscription(Entity, Generic[M]):
 
     def publishers(self) -> list[Token]:
         """Return the publishers that this subscription receives from."""
-        found = self.others.view().publishers(self.name)
-        return [token for token in found if self.matches(token)]
+        tokens = self.others.view().publishers(self.name)
+        return [token for token in tokens if self.matches(token)]
 
     # Receiving.
 
-    def _receive(self, sample: AnySample, decoder: Decoder | None = None) -> None:
-        """Put a sample into the queue; called on threads of the session.
-
-        Args:
-            sample: The sample.
-            decoder: Its decoder, if its key does not tell its type.
-        """
+    def _receive(self, sample: AnySample, decoder: SampleDecoder | None = None) -> None:
+        """Put a sample into the queue, on a thread of the session; its key may tell no type."""
         self._queue.put((sample, decoder))
         if self._callback is not None and self._queue_worker is None:
-            with self._learning, within(self.node.program):
+            with self._making, within(self.node.program):
                 if self._queue_worker is None:
                     self._queue_worker = Worker(
                         f"rosz-sub{self.name}",
@@ -205,11 +242,11 @@ class Subscription(Entity, Generic[M]):
         """Put a message of this process into the queue.
 
         Python runs one thread at a time, for 5 ms: a publisher that fills the queue within these
-        lets the callbacks have their turn, instead of displacing what they have not taken.
+        lets the callbacks have their turn, instead of displacing samples that they have not taken.
         """
-        self._unyielding += 1
-        if self._unyielding >= self._turn_after and len(self._queue.items) >= self._depth:
-            self._unyielding = 0
+        self._until_yield -= 1
+        if self._until_yield <= 0 and len(self._queue.items) >= self._depth:
+            self._until_yield = max(self._depth, _YIELD_AFTER)
             time.sleep(_YIELD_SECONDS)
         if self._queue_worker is None:
             self._receive(sample)
@@ -229,30 +266,26 @@ class Subscription(Entity, Generic[M]):
             except IndexError:
                 return
 
-    def _await_live(self, replayed: Reply, decoder: Decoder) -> None:
+    def _await_live(self, replayed: Reply, decoder: SampleDecoder) -> None:
         """Wait for the live samples up to a replayed one that was published since the start."""
         try:
             sequence, published, source = read_attachment(replayed.attachment or b"")
         except DecodeError:
-            return  # `_dispatch` says what is wrong
+            return  # `_dispatch` reports it
         deadline = time.monotonic() + _LIVE_SECONDS
-        while published > self._opened and decoder.last(source) < sequence:
+        while published > self._history.opened and decoder.last(source) < sequence:
             if self._queue.closed or time.monotonic() >= deadline:
                 return
             time.sleep(_POLL_SECONDS)
 
-    def _decode(self, sample: AnySample, decoder: Decoder | None) -> Received | None:
-        decoder = decoder or self._decoder or self._decoder_of(sample)
-        return None if decoder is None else decoder.decode(sample)
-
-    def _dispatch(self, sample: AnySample, decoder: Decoder | None = None) -> None:
+    def _dispatch(self, sample: AnySample, decoder: SampleDecoder | None = None) -> None:
         """Decode a sample, and call the callback with the message."""
         callback = self._callback
         if callback is None or self._queue.closed:
             return
         try:
             with self._turn:
-                decoder = decoder or self._decoder or self._decoder_of(sample)
+                decoder = decoder or self._decoder or self._decoders.of_sample(sample)
                 received = None if decoder is None else decoder.decode(sample)
                 if received is None:
                     return
@@ -299,7 +332,11 @@ class Subscription(Entity, Generic[M]):
         """Decode the oldest sample, if there is one."""
         with self._turn:  # decoding counts samples, so they must be decoded in their order
             item = self._queue.pop()
-            return None if item is None else self._decode(*item)
+            if item is None:
+                return None
+            sample, decoder = item
+            decoder = decoder or self._decoder or self._decoders.of_sample(sample)
+            return None if decoder is None else decoder.decode(sample)
 
     def __iter__(self) -> Iterator[M]:
         """Yield messages until the subscription or its context is closed."""
@@ -347,21 +384,24 @@ class Subscription(Entity, Generic[M]):
     # Types and latching publishers.
 
     def _follow(self, publisher: Token, alive: bool) -> None:
-        """Announce the publisher's type, and ask a latching one for what it sent before."""
+        """Announce the publisher's type, and request the history of a latching publisher."""
         if not alive or publisher.qos is None or not self.matches(publisher):
             return
         kind = publisher.type_name, publisher.type_hash
-        decoder = self._decoder or self._decoder_for(*kind)
+        decoder = self._decoder or self._decoders.of_type(*kind)
         if decoder is None:
             return
         if self.message_type is None:
             self._announce(kind, decoder)
-        if publisher.qos.latched:
+        if self._history.wanted and publisher.qos.latched:
             decoder.expect_replay(gid(format_token(publisher)))
+            # Samples with a lifespan, such as lines of /rosout, are events: late joiners skip them.
+            lasting = publisher.qos.lifespan == FOREVER
             receive = partial(self._receive, decoder=decoder)
-            self._request_history(publisher, publisher.qos.depth, receive)
+            history = _History(receive, self._history.start(lasting=lasting), lasting=lasting)
+            self._request_history(publisher, publisher.qos.depth, history.take, history.finish)
 
-    def _announce(self, kind: tuple[str, str], decoder: Decoder) -> None:
+    def _announce(self, kind: tuple[str, str], decoder: SampleDecoder) -> None:
         """Announce a subscription of one type, with a key for direct delivery."""
         if kind in self._announced:
             return
@@ -371,8 +411,8 @@ class Subscription(Entity, Generic[M]):
             self._receive_directly(entity, decoder)
             entity.announce(watch=False)
 
-    def _receive_directly(self, entity: Entity, decoder: Decoder) -> None:
-        """Receive what is sent to one subscription alone, and large samples in pieces."""
+    def _receive_directly(self, entity: Entity, decoder: SampleDecoder) -> None:
+        """Receive samples for one subscription alone, and large samples in pieces."""
         receive = partial(self._receive, decoder=decoder)
 
         def received(sample: FetchedSample, publisher: bytes) -> None:
@@ -384,7 +424,11 @@ class Subscription(Entity, Generic[M]):
         entity.keep(direct.register(entity.token.entity_id, receive, fetcher.announced))
 
     def _request_history(
-        self, publisher: Token, depth: int, receive: Callable[[Reply], None]
+        self,
+        publisher: Token,
+        depth: int,
+        receive: Callable[[Reply], None],
+        finish: Callable[[], None] = lambda: None,
     ) -> None:
         """Request the newest samples in a latching publisher's cache."""
         key = entity_key(publisher.domain, publisher.name, publisher.type_name, publisher.type_hash)
@@ -393,7 +437,7 @@ class Subscription(Entity, Generic[M]):
             context.session.get_async(
                 f"{key}/@adv/pub/{publisher.zid}/**",
                 lambda reply: receive(reply) if reply.ok else None,
-                lambda: None,
+                finish,
                 timeout=_HISTORY_TIMEOUT,
                 parameters=f"_max={min(depth, self._depth)};_anyke",
                 any_key=True,
@@ -403,57 +447,6 @@ class Subscription(Entity, Generic[M]):
                 self.node.log.warning(
                     "no history of '%s' from node '%s': %s", self.name, publisher.node_name, error
                 )
-
-    def _decoder_of(self, sample: AnySample) -> Decoder | None:
-        """Return the decoder for a sample whose key tells its type."""
-        *_, dds_name, type_hash = sample.key.split("/")
-        try:
-            return self._decoder_for(ros_type(dds_name), type_hash)
-        except DecodeError:
-            return None  # a key of Zenoh itself below the name of the topic
-
-    def _decoder_for(self, type_name: str, type_hash: str) -> Decoder | None:
-        """Return the decoder for a type; ``None``, after one warning, if it cannot be decoded."""
-        kind = (type_name, type_hash)
-        with self._learning:
-            if kind not in self._decoders:
-                self._decoders[kind] = self._learn(*kind)
-            return self._decoders[kind]
-
-    def _learn(self, type_name: str, type_hash: str) -> Decoder | None:
-        log = self.node.log
-        if self._raw:
-            return self._make_decoder(type_name, type_hash, None)
-        try:
-            message_type: type[Message] = self.node.context.types.message(type_name)
-        except RoszError as error:
-            log.warning("cannot decode what comes on '%s': %s", self.name, error)
-            return None
-        if type_hash not in {message_type._type_hash, NO_HASH}:
-            log.warning(
-                "cannot decode what comes on '%s': its definition of '%s' (%.15s…) is not the one"
-                " known here (%.15s…); put the sender's package on ROSZ_PACKAGE_PATH",
-                self.name,
-                type_name,
-                type_hash,
-                message_type._type_hash,
-            )
-            return None
-        return self._make_decoder(type_name, type_hash, message_type)
-
-    def _make_decoder(
-        self, type_name: str, type_hash: str, message_type: type[Message] | None
-    ) -> Decoder:
-        return Decoder(
-            self.name,
-            type_name,
-            type_hash,
-            None if message_type is None else self.node.context.decoder(message_type),
-            self.node.log,
-            partial(self._report_lost, (type_name, type_hash)),
-            message_type=message_type,
-            with_info=self._with_info,
-        )
 
     def _report_lost(self, kind: tuple[str, str], count: int) -> None:
         """Count samples that are missing, and warn of the first."""
@@ -493,23 +486,19 @@ class GenericSubscription(Subscription[Any]):
         *,
         raw: bool = False,
         with_info: bool = False,
+        history: bool = True,
     ) -> None:
-        super().__init__(node, topic, None, callback, qos, raw=raw, with_info=with_info)
+        super().__init__(
+            node, topic, None, callback, qos, raw=raw, with_info=with_info, history=history
+        )
 
 
 class _Queue:
-    """The newest samples, and the threads and event loops that wait for them.
+    """The newest samples, oldest first, and the threads and event loops that wait for them.
 
     A lock notifies the waiters: it is locked while no new item has come, and releasing it wakes one
     waiter. A condition takes several times as long, and every sample takes this path.
     A thread that leaves items in the queue, or finds it closed, wakes the next waiter.
-
-    Args:
-        depth: Number of newest samples to keep.
-
-    Attributes:
-        items: The samples, oldest first.
-        closed: Whether the queue is closed.
     """
 
     def __init__(self, depth: int) -> None:

@@ -7,18 +7,16 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Self
 
 import msgspec
 
 from rosz.errors import ClosedError, TimeMovedBackwards, UsageError
+from rosz.lifecycle import Closing
 from rosz.node.clock import Clock
 from rosz.session import clamp_timeout
 
-__all__ = ("Rate", "Timer", "TimerEvent")
-
-_HIGHEST_HZ = 1_000_000_000
-_MISSED_PERIODS = 2
+_HIGHEST_HZ = 1_000_000_000  # clocks count nanoseconds
+_MISSED_PERIODS = 2  # as in rospy, whose Rate starts anew when it is later
 
 
 class _Pace:
@@ -26,14 +24,6 @@ class _Pace:
 
     A turn that starts late shortens the wait for the next, so that the mean rate holds. A loop that
     is more than two periods late skips the turns that it missed.
-
-    Args:
-        period_ns: Period in nanoseconds.
-        now: Time at the start, in nanoseconds.
-
-    Attributes:
-        period_ns: As given.
-        last: Start of the current period, in nanoseconds.
     """
 
     __slots__ = ("last", "period_ns")
@@ -48,11 +38,7 @@ class _Pace:
         return self.period_ns - (now - self.last)
 
     def step(self, now: int) -> None:
-        """Begin the next period.
-
-        Args:
-            now: Time before the wait for the turn.
-        """
+        """Begin the next period; `now` is the time before the wait for the turn."""
         self.last += self.period_ns
         if now - self.last > _MISSED_PERIODS * self.period_ns:
             self.last = now
@@ -148,7 +134,7 @@ class TimerEvent(msgspec.Struct, frozen=True):
     last_duration: int | None
 
 
-class Timer:
+class Timer(Closing):
     """Call a function at each period until closed, or once.
 
     Calls never overlap. Like a `Rate`, the timer makes up for a late call, and skips the calls that
@@ -227,12 +213,6 @@ class Timer:
             return False
         self._thread.join(None if timeout is None else clamp_timeout(timeout))
         return not self._thread.is_alive()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         state = "" if self.alive else " ended"

@@ -2,16 +2,14 @@
 
 The modules exported here are pure. They know what parameters are, and nothing of the network:
 values (`values`), names (`paths`), writes and batches of them (`writes`), the tree that writes give
-(`tree`) and the set of writes behind it (`history`). They import nothing above the first floor.
+(`tree`) and the set of writes behind it (`history`). They import nothing above the first floor. The
+replicated store is the package `rosz.params.replica`.
 
 `PUBLIC_MODULES` are imported by name, because start-up needs one of them at a time:
 
 - `wire`: keys and messages of the store on the network (pure);
 - `ros2_file`: the nodes that values of a ROS 2 parameter file belong to (pure);
-- `yaml`: parameters as YAML text, and any YAML text read safely (pure, needs PyYAML);
-- `replica`: the replicated store of one process (fourth floor);
-- `remote`: the store as seen by a process that has no replica (fourth floor);
-- `api`: the store as seen by a node (fifth floor).
+- `yaml`: parameters as YAML text, and any YAML text read safely (pure, needs PyYAML).
 """
 
 from rosz.params.history import History
@@ -20,7 +18,11 @@ from rosz.params.tree import MISSING, Difference, Missing, leaves, lookup, previ
 from rosz.params.values import Value, normalise, type_name
 from rosz.params.writes import DELETED, Change, Deleted, Write, condense, spread
 
-PUBLIC_MODULES = ("api", "remote", "replica", "ros2_file", "wire", "yaml")
+PUBLIC_MODULES = (
+    "ros2_file",
+    "wire",
+    "yaml",
+)
 
 __all__ = (
     "DELETED",

@@ -20,8 +20,8 @@ its path or below, because a forgotten deletion that is newer than the write wou
 one too. Two sets with different horizons become one by `History.merge`: of the writes up to the
 other's horizon, those that the other neither holds nor proves are dropped. So a bounded memory
 never brings back what was deleted. It only loses parameters that are new to the other set and older
-than its horizon. What is proven depends on what was merged before, so sets with horizons that
-are merged in another order may differ; those that merge each other become the same.
+than its horizon. The proofs depend on earlier merges, so sets with horizons that are merged in
+another order may differ; those that merge each other become the same.
 
 A digest is `BUCKETS` numbers. Each write belongs to the bucket of its path and is folded into its
 number by exclusive or, so adding and removing cost the same, and equal sets have equal digests.
@@ -45,8 +45,6 @@ try:
     from _blake2 import blake2b
 except ImportError:
     from hashlib import blake2b
-
-__all__ = ("EMPTY_DIGEST", "Differences", "History", "Merge")
 
 _MAX_TOGGLED: Final = 1000
 EMPTY_DIGEST: Final = b""
@@ -191,8 +189,8 @@ class History:
         wanted: list[Path] = []
         ahead = behind = False
         for write in (write for bucket in buckets for write in self.bucket(bucket)):
-            known = index.get(write.path)
-            if known is not None and known >= (write.time, write.clock):
+            theirs = index.get(write.path)
+            if theirs is not None and theirs >= (write.time, write.clock):
                 continue
             lacking.append(write)
             behind = behind or write.time <= horizon
@@ -204,8 +202,8 @@ class History:
 
     def find(self, path: Path) -> Write | None:
         """Return the write at exactly this path."""
-        found = self.source(path)
-        return found if found is not None and found.path == path else None
+        source = self.source(path)
+        return source if source is not None and source.path == path else None
 
     def hides(self, write: Write) -> bool:
         """Tell whether a write is known, or a newer one at its path or above is."""
@@ -213,10 +211,10 @@ class History:
 
     def source(self, path: Path) -> Write | None:
         """Return the write that gives a path its value: the deepest one at the path or above."""
-        found = None
-        for found in self._above(path):  # noqa: B007  # the last one is returned
+        deepest = None
+        for deepest in self._above(path):  # noqa: B007  # the last one is returned
             pass
-        return found
+        return deepest
 
     def forget(self, keep: int) -> int:
         """Drop the oldest deletions once there are more than twice as many as to keep.
@@ -273,12 +271,12 @@ class History:
         )
 
     def provable(self, write: Write) -> Write | None:
-        """Return what is known to stand of a write up to the horizon.
+        """Return the part of a write up to the horizon that is proven to stand.
 
         If a forgotten deletion were newer than the write and at its path or above, it would have
         removed every older write there, so an older one proves that there is none. Parts of a dict
-        may have been deleted by themselves. If some are not proven, only that the dict replaced
-        what is older is known to stand: that is a deletion, right after the dict.
+        may have been deleted by themselves. If some are not proven, only the replacement of
+        older writes is proven: that is a deletion, right after the dict.
         """
         if all(self._holds_older(path, write.order) for path in _ends(write.value, write.path)):
             return write
@@ -422,20 +420,13 @@ def _ends(value: Value | Deleted, path: Path) -> Iterator[Path]:
 
 
 def _standing(
-    writes: Mapping[Order, Write], known: Mapping[Order, Write], horizon: int, other: History
+    writes: Mapping[Order, Write], others: Mapping[Order, Write], horizon: int, other: History
 ) -> Iterator[Write]:
-    """Yield the writes of a set that stand when another set is merged.
-
-    Args:
-        writes: Writes of the set.
-        known: Writes of the other set.
-        horizon: Horizon of the other set.
-        other: The other set.
-    """
+    """Yield the writes of a set that stand when another set, with its horizon, is merged."""
     for order, write in writes.items():
-        found = write if write.time > horizon or order in known else other.provable(write)
-        if found is not None:
-            yield found
+        standing = write if write.time > horizon or order in others else other.provable(write)
+        if standing is not None:
+            yield standing
 
 
 def _comes_after(write: Write, other: Write) -> bool:

@@ -19,19 +19,6 @@ from rosz import names
 from rosz.errors import DecodeError, InvalidName, ParamError
 from rosz.params.values import unsound_text
 
-__all__ = (
-    "ROOT",
-    "Path",
-    "climb",
-    "common_path",
-    "from_key",
-    "joined",
-    "resolve",
-    "split",
-    "to_key",
-    "to_path",
-)
-
 Path = tuple[str, ...]
 ROOT: Final[Path] = ()
 
@@ -43,10 +30,11 @@ def split(name: str) -> Path:
     """Return the path of a global name; empty parts are ignored.
 
     Raises:
-        InvalidName: The name is not global, or holds half of a surrogate pair.
+        InvalidName: The name is not global, too long, or holds half of a surrogate pair.
     """
     if not name.startswith("/"):
         raise InvalidName(name, "it is not global; expected it to start with '/'")
+    names.check_length(name, names.LONGEST_PATH)
     reason = unsound_text(name)
     if reason:
         raise InvalidName(ascii(name)[1:-1], reason)
@@ -57,7 +45,7 @@ def to_path(name: str | Path) -> Path:
     """Return the path of a name that is given as global name or as path.
 
     Raises:
-        InvalidName: The name is not global, or holds half of a surrogate pair.
+        InvalidName: The name is not global, too long, or holds half of a surrogate pair.
     """
     return split(name) if isinstance(name, str) else name
 
@@ -69,10 +57,10 @@ def joined(path: Path) -> str:
 
 def common_path(paths: Iterable[Path]) -> Path:
     """Return the longest path that all paths lie at or below; the root if there are no paths."""
-    found = list(paths)
-    if not found:
+    all_paths = list(paths)
+    if not all_paths:
         return ROOT
-    first, last = min(found), max(found)
+    first, last = min(all_paths), max(all_paths)
     length = 0
     while length < min(len(first), len(last)) and first[length] == last[length]:
         length += 1
@@ -127,8 +115,8 @@ def climb(name: str, node: str, exists: Callable[[str], bool]) -> str | None:
     if not parts:
         raise ParamError(f"cannot search for '{name}'; expected a relative or global name")
     if name.startswith("/"):
-        found = joined(parts)
-        return found if exists(found) else None
+        resolved = joined(parts)
+        return resolved if exists(resolved) else None
     spaces = [part for part in node.split("/") if part]
     for depth in range(len(spaces), -1, -1):
         above = spaces[:depth]
@@ -159,12 +147,12 @@ def from_key(key: str) -> Path:
     return path
 
 
-def _escape(found: re.Match[str]) -> str:
-    return "".join(f"%{byte:02X}" for byte in found[0].encode())
+def _escape(match: re.Match[str]) -> str:
+    return "".join(f"%{byte:02X}" for byte in match[0].encode())
 
 
 def _unescape(chunk: str) -> str:
     if "%" not in chunk:
         return chunk
     raw = chunk.encode()
-    return _ESCAPED.sub(lambda found: bytes.fromhex(found[1].decode()), raw).decode()
+    return _ESCAPED.sub(lambda match: bytes.fromhex(match[1].decode()), raw).decode()

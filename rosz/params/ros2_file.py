@@ -13,8 +13,6 @@ from typing import Any, Final
 
 from rosz.errors import ParamError
 
-__all__ = ("assign", "sections")
-
 _KEY: Final = "ros__parameters"
 _WILDCARD: Final = re.compile(r"/\*\*|/\*")
 
@@ -22,9 +20,9 @@ _WILDCARD: Final = re.compile(r"/\*\*|/\*")
 def assign(value: Any, namespace: str) -> list[tuple[str, Any]]:
     """Return the values of a parameter file with the namespace that each belongs to.
 
-    A file of ROS 1 belongs to the namespace whole. Of a file of ROS 2, the root takes what it has
-    for nodes that it names; any other namespace is the name of a node, and takes what the file has
-    for that node, wildcards first.
+    A file of ROS 1 belongs to the namespace whole. Of a file of ROS 2, the root takes the values
+    of nodes that the file names; any other namespace is the name of a node, and takes the values
+    of that node, wildcards first.
 
     Args:
         value: Content of a document.
@@ -36,24 +34,24 @@ def assign(value: Any, namespace: str) -> list[tuple[str, Any]]:
     """
     if not _has_key(value):
         return [(namespace, value)]
-    found = [(f"/{name.strip('/')}", values) for name, values in sections(value)]
+    parts = [(f"/{name.strip('/')}", values) for name, values in sections(value)]
     node = f"/{namespace.strip('/')}"
     if node != "/":
-        matching = [(name, values) for name, values in found if _pattern(name).fullmatch(node)]
+        matching = [(name, values) for name, values in parts if _pattern(name).fullmatch(node)]
         if not matching:
-            names = ", ".join(f"'{name}'" for name, _ in found)
+            names = ", ".join(f"'{name}'" for name, _ in parts)
             raise ParamError(
                 f"this parameter file of ROS 2 has nothing for the node '{node}', only for {names}"
             )
         matching.sort(key=lambda section: "*" not in section[0])
         return [(node, _nest(values)) for _, values in matching]
-    for name, _ in found:
+    for name, _ in parts:
         if "*" in name:
             raise ParamError(
                 f"'{name}' in this parameter file of ROS 2 means any node that reads it; load it "
                 "into a node: give the node's name as namespace, or write <rosparam> inside <node>"
             )
-    return [(name, _nest(values)) for name, values in found]
+    return [(name, _nest(values)) for name, values in parts]
 
 
 def sections(tree: Any, name: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
@@ -85,7 +83,9 @@ def _has_key(tree: Any) -> bool:
 def _pattern(name: str) -> re.Pattern[str]:
     """Return the pattern of the nodes that a name with wildcards stands for."""
     literal = map(re.escape, _WILDCARD.split(name))
-    wildcards = [r"(?:/[^/]+)*" if one == "/**" else "/[^/]+" for one in _WILDCARD.findall(name)]
+    wildcards = [
+        r"(?:/[^/]+)*" if wildcard == "/**" else "/[^/]+" for wildcard in _WILDCARD.findall(name)
+    ]
     return re.compile("".join(a + b for a, b in zip(literal, [*wildcards, ""], strict=True)))
 
 

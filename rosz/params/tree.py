@@ -17,17 +17,6 @@ from rosz.params.paths import Path, joined
 from rosz.params.values import Value
 from rosz.params.writes import DELETED, Change, Deleted, check_write
 
-__all__ = (
-    "MISSING",
-    "Difference",
-    "Draft",
-    "Missing",
-    "Tree",
-    "leaves",
-    "lookup",
-    "preview",
-)
-
 Tree = dict[str, Value]
 
 

@@ -13,16 +13,6 @@ from typing import Any, Final
 
 from rosz.errors import ParamError
 
-__all__ = (
-    "MAX_DEPTH",
-    "Value",
-    "convert",
-    "copy",
-    "normalise",
-    "type_name",
-    "unsound_text",
-)
-
 Value = Any
 """The value of a parameter: one of the types above, nested at most `MAX_DEPTH` deep."""
 
@@ -76,7 +66,7 @@ def normalise(value: object, name: str = "") -> Value:
     """Return a private copy of a value in the store's own types.
 
     Tuples become lists, and instances of subclasses become instances of the base class. Objects
-    with a ``tolist`` method (numpy scalars and arrays, ``array.array``) become what it returns.
+    with a ``tolist`` method (numpy scalars and arrays, ``array.array``) become its result.
 
     Args:
         value: Value to set.
@@ -169,27 +159,27 @@ def _integer(value: int) -> int:
 
 
 def _mapping(value: dict[Any, Any], depth: int) -> dict[str, Value]:
-    found: dict[str, Value] = {}
+    items: dict[str, Value] = {}
     for key, item in value.items():
         if not isinstance(key, str):
             raise _RefusedError(f"the key {key!r} is a {type_name(key)}; expected a str")
         try:
-            found[_text(str.__str__(key))] = _normalise(item, depth + 1)
+            items[_text(str.__str__(key))] = _normalise(item, depth + 1)
         except _RefusedError as refused:
             refused.trail.append(f"/{key}")
             raise
-    return found
+    return items
 
 
 def _sequence(value: list[Any] | tuple[Any, ...], depth: int) -> list[Value]:
-    found: list[Value] = []
+    items: list[Value] = []
     for index, item in enumerate(value):
         try:
-            found.append(_normalise(item, depth + 1))
+            items.append(_normalise(item, depth + 1))
         except _RefusedError as refused:
             refused.trail.append(f"[{index}]")
             raise
-    return found
+    return items
 
 
 def _unusual(value: Any, depth: int) -> Value:

@@ -7,7 +7,8 @@ The protocol between replicas, and between a replica and its clients:
   storage) publishes an **acknowledgement**, that number and its own session, on ``ack`` of the
   writer. A replica that does not acknowledge in time is sent the batch once more as a query on its
   ``write`` key (the barrier query), whose reply is the acknowledgement. A replica that refuses the
-  batch, or cannot store it, adds the reason; the writer then undoes the batch.
+  batch, or cannot store it, adds the reason, which the writer raises.
+  A replica that leaves publishes a batch with number 0 (`Departure`).
 - **Exchange of differences.** A replica sends another its **digest** on the ``sync`` key of the
   other. If the digests differ, it sends the index (path and stamp) of its writes in the buckets
   that differ. The reply holds the writes that it lacks, and the paths of the writes that the other
@@ -15,7 +16,7 @@ The protocol between replicas, and between a replica and its clients:
   gets all writes in the first reply. Deletions are writes as well (**tombstones**). A replica that
   has forgotten deletions which the other may not know replies with all its writes, for the other
   to merge (`rosz.params.history`).
-  A replica that is an elder appoints another one with the digest that it sends.
+  A replica that is a seed appoints another one with the digest that it sends.
 - **Clients.** A process that has no replica reads on the ``ask`` key of a replica, and writes on
   its ``set`` key, with a stamp of its own.
 
@@ -49,7 +50,7 @@ from __future__ import annotations
 import datetime as dt
 import struct
 from collections.abc import Iterable, Sequence
-from typing import Any, Final, Literal, TypeVar
+from typing import Any, ClassVar, Final, Literal, TypeVar
 
 import msgspec
 
@@ -59,39 +60,12 @@ from rosz.params.values import Value, normalise
 from rosz.params.writes import DELETED, Change, Write, put
 from rosz.wire import own_key
 
-__all__ = (
-    "BUCKETS",
-    "Batch",
-    "ClientReply",
-    "ClientRequest",
-    "Index",
-    "Keys",
-    "Member",
-    "Purpose",
-    "Record",
-    "SyncReply",
-    "SyncRequest",
-    "add_header",
-    "check_reach",
-    "decode",
-    "decode_value",
-    "encode",
-    "encode_value",
-    "join_path",
-    "pack_digest",
-    "pack_value",
-    "read_digest",
-    "read_header",
-    "read_time",
-    "split_path",
-)
-
 BUCKETS: Final = 64
 """Buckets of a digest."""
 
 _BUCKET: Final = struct.Struct("<BQ")
 _REPLICA: Final = "replica"
-_ELDER: Final = "elder"
+_SEED: Final = "elder"  # the word on the network, which replicas of other versions know
 _MOMENT: Final = 1
 _DATE: Final = 2
 _PLAIN: Final = frozenset({bool, int, float, str, bytes})
@@ -104,7 +78,7 @@ Purpose = Literal["write", "sync", "tell", "ask", "set"]
 """The purpose of a query to one replica, as in its key; see the list of keys above."""
 
 
-class Member(msgspec.Struct, frozen=True, order=True):
+class ReplicaMember(msgspec.Struct, frozen=True, order=True):
     """A replica, as described by its liveliness token; a younger replica is greater.
 
     Attributes:
@@ -131,7 +105,7 @@ class Keys:
         all_params: Key expression of all parameters, including the root.
         change: Key of batches, without a path.
         tokens: Key expression of the liveliness tokens of all replicas.
-        elders: Key expression of the second tokens of elders.
+        seeds: Key expression of the second tokens of seeds.
     """
 
     def __init__(self, domain: int, *, scoped: bool = False) -> None:
@@ -140,7 +114,7 @@ class Keys:
         self.all_params: str = f"{self.params}/**"
         self.change: str = own_key(domain, "change")
         self.tokens: str = own_key(domain, _REPLICA, "**")
-        self.elders: str = own_key(domain, _ELDER, "**")
+        self.seeds: str = own_key(domain, _SEED, "**")
         self._domain = domain
 
     def param(self, path: Path) -> str:
@@ -197,32 +171,32 @@ class Keys:
             raise DecodeError("parameter key", 0, f"'{key}', expected '{base}/**'")
         return from_key(key[len(base) + 1 :])
 
-    def token(self, member: Member) -> str:
+    def token(self, member: ReplicaMember) -> str:
         """Return the liveliness token of a replica."""
         return self._token(_REPLICA, member)
 
-    def elder_token(self, member: Member) -> str:
-        """Return the second token of a replica that is an elder."""
-        return self._token(_ELDER, member)
+    def seed_token(self, member: ReplicaMember) -> str:
+        """Return the second token of a replica that is a seed."""
+        return self._token(_SEED, member)
 
-    def _token(self, kind: str, member: Member) -> str:
+    def _token(self, kind: str, member: ReplicaMember) -> str:
         label = to_key((member.label or "-",))
         return own_key(self._domain, kind, member.zid, str(member.start), label)
 
-    def member(self, token: str) -> Member:
+    def member(self, token: str) -> ReplicaMember:
         """Return the replica that one of its liveliness tokens describes.
 
         Raises:
             DecodeError: The text is not the token of a replica.
         """
-        heads = [own_key(self._domain, kind) + "/" for kind in (_REPLICA, _ELDER)]
-        head = next((one for one in heads if token.startswith(one)), "")
+        heads = [own_key(self._domain, kind) + "/" for kind in (_REPLICA, _SEED)]
+        head = next((start for start in heads if token.startswith(start)), "")
         chunks = token[len(head) :].split("/")
         if not head or len(chunks) != 3 or not chunks[1].isdecimal():  # noqa: PLR2004  # zid, start, label
             raise DecodeError(
                 "replica token", 0, f"'{token}', expected '{heads[0]}<zid>/<start>/<who>'"
             )
-        return Member(int(chunks[1]), chunks[0], joined(from_key(chunks[2]))[1:])
+        return ReplicaMember(int(chunks[1]), chunks[0], joined(from_key(chunks[2]))[1:])
 
 
 def check_reach(paths: Iterable[Path], reach: Path) -> None:
@@ -281,6 +255,21 @@ class Batch(msgspec.Struct, array_like=True):
         stamp, origin = (self.time, self.clock), self.origin
         puts = [_read_write(path, stamp, value, origin) for path, value in self.puts]
         return puts + [_read_write(path, stamp, DELETED, origin) for path in self.deletions]
+
+
+class Departure(Batch, array_like=True):
+    """A batch without writes, by which a replica says that it leaves; its number is 0.
+
+    Replicas that do not know of departures see a batch that changes nothing. Any `Batch` can be
+    decoded as one, of kind 0.
+
+    Attributes:
+        kind: `LEAVES` or `RESTARTS`.
+    """
+
+    LEAVES: ClassVar[int] = 1
+    RESTARTS: ClassVar[int] = 2
+    kind: int = 0
 
 
 class _BatchStart(msgspec.Struct, array_like=True):
@@ -372,7 +361,7 @@ class SyncRequest(msgspec.Struct, omit_defaults=True):
         records: Writes that the receiver lacks.
         horizon: Time up to which the sender may have forgotten deletions.
         sender: Zenoh id of the sender's session.
-        appoints: Whether the receiver has to become an elder.
+        appoints: Whether the receiver has to become a seed.
     """
 
     digest: bytes | None = None
@@ -433,6 +422,9 @@ class ClientReply(msgspec.Struct, omit_defaults=True):
         text: Reason if it is refused.
         origin: Writer of the value, as shown to users.
         slow: Replicas that did not acknowledge a write in time.
+        holders: Number of replicas, beside the one that replies, that acknowledged a write.
+        reasons: If a write stands, but not everywhere: the replicas that do not keep it, and why.
+        what: The parameters of such a write, as shown to users.
     """
 
     status: str = "ok"
@@ -440,6 +432,9 @@ class ClientReply(msgspec.Struct, omit_defaults=True):
     text: str = ""
     origin: str = ""
     slow: list[str] = []
+    holders: int = 0
+    reasons: dict[str, str] = {}
+    what: str = ""
 
 
 def encode(message: msgspec.Struct) -> bytes:
@@ -571,5 +566,5 @@ _ENCODER: Final = msgspec.msgpack.Encoder()
 _ANY: Final = msgspec.msgpack.Decoder(ext_hook=_read_extension)
 _DECODERS: Final[dict[type, Any]] = {
     kind: msgspec.msgpack.Decoder(kind, ext_hook=_read_extension)
-    for kind in (Batch, _BatchStart, SyncRequest, SyncReply, ClientRequest, ClientReply)
+    for kind in (Batch, Departure, _BatchStart, SyncRequest, SyncReply, ClientRequest, ClientReply)
 }

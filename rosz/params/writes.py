@@ -20,20 +20,6 @@ from rosz.errors import DecodeError, ParamError
 from rosz.params.paths import ROOT, Path, joined, split
 from rosz.params.values import MAX_DEPTH, Value, type_name
 
-__all__ = (
-    "DELETED",
-    "Change",
-    "Deleted",
-    "Order",
-    "Write",
-    "check_time",
-    "check_write",
-    "condense",
-    "latest_time",
-    "put",
-    "spread",
-)
-
 _PAST: Final = 1_767_225_600 * 10**9
 """The start of 2026: a clock without a battery starts years behind, and shows an earlier time."""
 

@@ -29,19 +29,6 @@ from rosz.errors import ParamError, YamlError
 from rosz.params.ros2_file import assign
 from rosz.params.values import MAX_DEPTH, Value, normalise, type_name, unsound_text
 
-__all__ = (
-    "degrees",
-    "dump",
-    "format_get",
-    "inline",
-    "load",
-    "load_all",
-    "load_documents",
-    "pretty",
-    "radians",
-    "read_plain",
-)
-
 _NAMESPACE_KEY: Final = "_ns"
 _MAP: Final = "tag:yaml.org,2002:map"
 _SEQ: Final = "tag:yaml.org,2002:seq"
@@ -54,6 +41,8 @@ _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 _MAX_ANGLE: Final = 200
 """Characters of the text of an angle; a longer one could overflow Python's parser."""
+
+_TOO_DEEP: Final = f"it is nested more than {MAX_DEPTH} deep"
 
 _SCALAR_FAULTS: Final = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 """Exceptions that PyYAML raises when a scalar does not fit its tag."""
@@ -91,7 +80,7 @@ class _PlainLoader(_Base):  # type: ignore[misc]  # either of two base classes
             ) from error
 
 
-class _Loader(_PlainLoader):
+class _TagLoader(_PlainLoader):
     """PyYAML's safe loader with rosparam's tags."""
 
 
@@ -131,7 +120,7 @@ def load_all(text: str, path: str = "<string>", *, null_as_empty: bool = False) 
     """
     return [
         {} if null_as_empty and node.tag == _NULL else _Builder(loader, path).build(node)
-        for loader, node in _read_nodes(_Loader, text, path)
+        for loader, node in _read_nodes(_TagLoader, text, path)
     ]
 
 
@@ -144,12 +133,12 @@ def load(text: str, path: str = "<string>") -> Value:
     """
     if not text:
         return ""
-    found = list(_read(text, path))
-    if len(found) > 1:
-        raise YamlError(f"{len(found)} documents, expected one", path, found[1][1] + 1, 1)
-    if not found:
+    documents = list(_read(text, path))
+    if len(documents) > 1:
+        raise YamlError(f"{len(documents)} documents, expected one", path, documents[1][1] + 1, 1)
+    if not documents:
         raise YamlError("nothing but comments and space; expected a value", path)
-    return found[0][0]
+    return documents[0][0]
 
 
 def load_documents(
@@ -171,7 +160,7 @@ def load_documents(
     Raises:
         YamlError: The text is not YAML, or holds a value that a parameter cannot hold.
     """
-    found: list[tuple[str, Value]] = []
+    documents: list[tuple[str, Value]] = []
     for value, line in _read(text, path):
         space = namespace
         if type(value) is dict and _NAMESPACE_KEY in value:
@@ -182,10 +171,10 @@ def load_documents(
                 )
             space = inner if inner.startswith("/") else f"{namespace.rstrip('/')}/{inner}"
         try:
-            found += assign(value, space)
+            documents += assign(value, space)
         except ParamError as error:
             raise YamlError(str(error), path, line + 1, 1) from error
-    return found
+    return documents
 
 
 def read_plain(text: str, path: str) -> Iterator[Any]:
@@ -248,7 +237,7 @@ def _pretty_lines(tree: dict[str, Value], indent: str) -> Iterator[str]:
 
 def _read(text: str, path: str) -> Iterator[tuple[Value, int]]:
     """Yield the value of each document and the line that it starts on, counted from 0."""
-    for loader, node in _read_nodes(_Loader, text, path):
+    for loader, node in _read_nodes(_TagLoader, text, path):
         yield _Builder(loader, path).build(node), node.start_mark.line
 
 
@@ -321,16 +310,7 @@ class _Builder:
 
 
 def _read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, Any]]:
-    """Yield for each document its loader, which constructs the scalars, and its top node.
-
-    Args:
-        loader_class: PyYAML loader with constructors and resolvers.
-        text: YAML text.
-        path: File that the text is from, for error messages.
-
-    Raises:
-        YamlError: The text is not YAML, is nested too deep, or repeats too much by aliases.
-    """
+    """Yield for each document its loader, which constructs the scalars, and its top node."""
     reason = unsound_text(text)
     if reason:
         raise YamlError(reason, path)
@@ -346,10 +326,27 @@ def _read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, 
     except yaml.MarkedYAMLError as error:
         parts = [part for part in (error.context, error.problem) if part]
         reason = ", ".join(parts) or "it is not YAML"
+        if "nesting depth" in reason:
+            raise _too_deep(text, path) from error
         mark = error.problem_mark or error.context_mark
         raise (YamlError(reason, path) if mark is None else _fault(mark, reason, path)) from error
     finally:
         loader.dispose()
+
+
+def _too_deep(text: str, path: str) -> YamlError:
+    """Return the error of a text that libyaml refuses for its depth.
+
+    Its scanner, which reads ahead, refuses 1000 levels (in PyYAML 6.0.4) before the composer has
+    seen the limit of rosz. PyYAML's own parser has no such limit, and reads as far as that.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_DEPTH + 1:  # the outermost collection has the depth 0
+            return _fault(event, _TOO_DEEP, path)
+    return YamlError(_TOO_DEEP, path)
 
 
 class _Anchored:
@@ -418,7 +415,7 @@ class _Composer:
         self._size += size
         self._deepest = max(self._deepest, depth)
         if depth > MAX_DEPTH:
-            raise _fault(event, f"it is nested more than {MAX_DEPTH} deep", self._path)
+            raise _fault(event, _TOO_DEEP, self._path)
 
     def _empty(self, event: Any) -> Any:
         kind, content = _NODES[type(event)]
@@ -511,22 +508,18 @@ def _evaluate(node: Any) -> float:
 
 
 def _of_math(node: Any) -> Any:
-    """Return the function or constant that ``math.<name>`` means.
-
-    Raises:
-        ValueError: The node is something else.
-    """
+    """Return the function or constant that ``math.<name>`` means."""
     attribute = getattr(node, "attr", "_")
     if getattr(getattr(node, "value", None), "id", "") != "math" or attribute.startswith("_"):
         raise ValueError
-    found = getattr(math, attribute, None)
-    if found is None:
+    member = getattr(math, attribute, None)
+    if member is None:
         raise ValueError
-    return found
+    return member
 
 
-_Loader.add_constructor("!degrees", lambda loader, node: degrees(loader.construct_scalar(node)))
-_Loader.add_constructor("!radians", lambda loader, node: radians(loader.construct_scalar(node)))
-for _class in _Loader, _Dumper:  # so that a text which looks like an angle is written in quotes
+_TagLoader.add_constructor("!degrees", lambda loader, node: degrees(loader.construct_scalar(node)))
+_TagLoader.add_constructor("!radians", lambda loader, node: radians(loader.construct_scalar(node)))
+for _class in (_TagLoader, _Dumper):  # a text that looks like an angle is written in quotes
     _class.add_implicit_resolver("!degrees", re.compile(r"^deg\([^\)]*\)$"), ["d"])
     _class.add_implicit_resolver("!radians", re.compile(r"^rad\([^\)]*\)$"), ["r"])

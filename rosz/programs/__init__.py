@@ -5,14 +5,6 @@ them. They are public modules, because each is loaded alone. May import everythi
 line.
 """
 
-PUBLIC_MODULES = (
-    "diagnostic_aggregator",
-    "joint_state_publisher",
-    "map_server",
-    "robot_state_publisher",
-    "teleop_twist_keyboard",
-    "tf",
-    "xacro",
-)
+PUBLIC_MODULES = ("tf",)
 
 __all__ = ()

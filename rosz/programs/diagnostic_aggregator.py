@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 
@@ -19,24 +19,12 @@ from rosz.msgs.diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, Key
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node, NodeLog, serve_loggers
 
-__all__ = (
-    "Aggregator",
-    "Analyzer",
-    "AnalyzerError",
-    "AnalyzerGroup",
-    "DiscardAnalyzer",
-    "GenericAnalyzer",
-    "IgnoreAnalyzer",
-    "Item",
-    "Section",
-    "main",
-)
-
 _OK, _ERROR, _STALE = DiagnosticStatus.OK, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 _TEXTS = {_OK: "OK", DiagnosticStatus.WARN: "Warning", _ERROR: "Error", _STALE: "Stale"}
 _NANOSECONDS = 1_000_000_000
 _TIMEOUT = 5.0
 _NONE = -1
+# As in ROS 1: all nodes of a robot publish on one topic, often at the same time.
 _QUEUE = 1000
 
 
@@ -45,16 +33,7 @@ class AnalyzerError(RoszError):
 
 
 class Item(msgspec.Struct):
-    """A status that was received, or is missing.
-
-    Attributes:
-        name: Name of the status.
-        updated: Time of its arrival in nanoseconds.
-        level: Level, at most stale.
-        message: Its message.
-        hardware_id: Its hardware.
-        values: Its values.
-    """
+    """A status that was received at a time in nanoseconds, or is missing; at most stale."""
 
     name: str
     updated: int
@@ -95,36 +74,13 @@ def _without_prefix(path: str, prefix: str) -> str:
     return f"{above}/{last.removeprefix(':').lstrip(' ')}" if slash else last
 
 
-class Analyzer(Protocol):
-    """Takes some statuses, and reports them below its path.
-
-    Attributes:
-        path: Path of what it reports.
-        name: Name in the report of its group.
-    """
-
-    path: str
-    name: str
-
-    def match(self, name: str) -> bool:
-        """Return whether the analyzer takes a status of a name."""
-
-    def analyze(self, item: Item) -> bool:
-        """Take a status; return whether it was taken."""
-
-    def report(self, now: int) -> list[DiagnosticStatus]:
-        """Return the statuses at a time in nanoseconds."""
-
-
 class Section:
-    """Statuses below one path, with a status that sums them up.
+    """Takes statuses, and reports them below one path, with a status that sums them up.
 
     Args:
-        path: The path.
-        name: Name of the section.
         now: Time in nanoseconds.
         timeout: Age in seconds at which statuses are stale; never if not above 0.
-        expected_number: How many statuses there have to be; negative for any number.
+        expected_number: Required number of statuses; negative for any number.
         discard_stale: Whether to leave out stale ones.
     """
 
@@ -163,7 +119,7 @@ class Section:
             for name, item in sorted(self.items.items())
         }
         if self._discards:
-            self.items = {name: one for name, one in self.items.items() if not stale[name]}
+            self.items = {name: item for name, item in self.items.items() if not stale[name]}
             stale = {name: False for name in stale if name in self.items}
         items = {name: self.items[name] for name in stale}
         head = DiagnosticStatus(
@@ -179,38 +135,32 @@ class Section:
             self._level, self._level_since = head.level, now
         if forgotten and not items:
             return []
-        return [head, *(one.status(self.path, stale=stale[name]) for name, one in items.items())]
+        return [head, *(item.status(self.path, stale=stale[name]) for name, item in items.items())]
 
     def _check_number(self, head: DiagnosticStatus) -> None:
-        expected, found = self._expected_number, len(self.items)
-        if expected == 0 == found:
+        expected, count = self._expected_number, len(self.items)
+        if expected == 0 == count:
             head.level, head.message = _OK, _TEXTS[_OK]
-        elif expected > 0 and found != expected:
+        elif expected > 0 and count != expected:
             head.level = max(head.level, _ERROR)
             head.message = (
-                f"Expected {expected}, found {found}"
-                if found
+                f"Expected {expected}, found {count}"
+                if count
                 else f"No items found, expected {expected}"
             )
 
 
 def _sum(levels: Iterable[int]) -> int:
     """Return the highest level; stale if all are, and an error if only some are."""
-    found = set(levels)
-    if found <= {_STALE}:
+    distinct = set(levels)
+    if distinct <= {_STALE}:
         return _STALE
-    highest = max(found)
+    highest = max(distinct)
     return _ERROR if highest == _STALE else highest
 
 
 class GenericAnalyzer(Section):
     """Statuses whose names meet one of some conditions.
-
-    Args:
-        base: Path of its group.
-        params: Its parameters.
-        log: NodeLog for conditions that are not regular expressions.
-        now: Time in nanoseconds.
 
     Raises:
         AnalyzerError: It has no path, or no condition.
@@ -240,7 +190,7 @@ class GenericAnalyzer(Section):
             expected_number=int(params.get("num_items", _NONE)),
             discard_stale=bool(params.get("discard_stale", False)),
         )
-        self.items = {one: Item(one, now) for one in self._expected}
+        self.items = {expected: Item(expected, now) for expected in self._expected}
 
     def match(self, name: str) -> bool:
         """Return whether a name meets a condition."""
@@ -253,12 +203,12 @@ class GenericAnalyzer(Section):
 
     def report(self, now: int) -> list[DiagnosticStatus]:
         """Return the sum of the statuses and the statuses, also those that are missing."""
-        found = super().report(now)
-        names = {status.name.rpartition("/")[2] for status in found}
-        missing = [one for one in self._expected if not self._forms(one) & names]
-        level = _STALE if all(one.level == _STALE for one in found) else _ERROR
-        found += [Item(one, now).status(self.path, stale=True) for one in missing]
-        for status in found:
+        statuses = super().report(now)
+        names = {status.name.rpartition("/")[2] for status in statuses}
+        missing = [name for name in self._expected if not self._forms(name) & names]
+        level = _STALE if all(status.level == _STALE for status in statuses) else _ERROR
+        statuses += [Item(name, now).status(self.path, stale=True) for name in missing]
+        for status in statuses:
             for prefix in self._removed:
                 status.name = _without_prefix(status.name, prefix)
             if missing and status.name == self.path:
@@ -266,8 +216,8 @@ class GenericAnalyzer(Section):
                 to = "STALE" if level == _STALE else "ERROR"
                 status.level = level
                 status.message = f"{kind} diagnostics are stale - setting combined level to {to}."
-                status.values += [KeyValue(one, "Missing") for one in missing]
-        return found
+                status.values += [KeyValue(name, "Missing") for name in missing]
+        return statuses
 
     def _forms(self, name: str) -> set[str]:
         """Return how the last part of the path of a status of a name may look."""
@@ -282,20 +232,15 @@ class DiscardAnalyzer(GenericAnalyzer):
         return []
 
 
-class IgnoreAnalyzer:
+class IgnoreAnalyzer(Section):
     """Takes nothing; its parameters are not looked at."""
 
     def __init__(self, base: str, params: Mapping[str, Any], log: NodeLog, now: int) -> None:
-        del base, params, log, now
-        self.path: str = ""
-        self.name: str = ""
+        del base, params, log
+        super().__init__("", "", now)
 
     def match(self, name: str) -> bool:  # noqa: ARG002
         """Return that it takes no status."""
-        return False
-
-    def analyze(self, item: Item) -> bool:  # noqa: ARG002
-        """Take nothing."""
         return False
 
     def report(self, now: int) -> list[DiagnosticStatus]:  # noqa: ARG002
@@ -307,10 +252,7 @@ class AnalyzerGroup:
     """Analyzers below one path.
 
     Args:
-        base: Path of its own group.
         params: Its parameters: ``path``, and ``analyzers`` with a dictionary for each.
-        log: NodeLog for analyzers that cannot be used.
-        now: Time in nanoseconds.
         strict: Whether every analyzer has to be usable.
 
     Raises:
@@ -322,12 +264,12 @@ class AnalyzerGroup:
     ) -> None:
         self.name: str = str(params.get("path", ""))
         self.path: str = _below(base, self.name)
-        self._matches: dict[str, list[Analyzer]] = {}
-        self._analyzers: list[Analyzer] = []
+        self._matches: dict[str, list[Section | AnalyzerGroup]] = {}
+        self._analyzers: list[Section | AnalyzerGroup] = []
         self._unusable: list[Item] = []
         given = params.get("analyzers")
-        for name, one in sorted(given.items()) if isinstance(given, dict) else ():
-            kind = one.get("type") if isinstance(one, dict) else None
+        for name, settings in sorted(given.items()) if isinstance(given, dict) else ():
+            kind = settings.get("type") if isinstance(settings, dict) else None
             cls = _CLASSES.get(str(kind).removeprefix("diagnostic_aggregator/"))
             if cls is None:
                 log.error("analyzer '%s' has the type '%s'; expected %s", name, kind, _TYPES)
@@ -335,7 +277,7 @@ class AnalyzerGroup:
                     self._unusable.append(Item(name, now, message="No Analyzer type given"))
                 continue
             try:
-                self._analyzers.append(cls(self.path, one, log, now))
+                self._analyzers.append(cls(self.path, settings, log, now))
             except AnalyzerError as error:
                 log.warning("analyzer '%s' cannot be used: %s", name, error)
                 self._unusable.append(Item(name, now, message="Analyzer init failed"))
@@ -347,41 +289,40 @@ class AnalyzerGroup:
     def match(self, name: str) -> bool:
         """Return whether an analyzer takes a status of a name."""
         if name not in self._matches:
-            self._matches[name] = [one for one in self._analyzers if one.match(name)]
+            self._matches[name] = [analyzer for analyzer in self._analyzers if analyzer.match(name)]
         return bool(self._matches[name])
 
     def analyze(self, item: Item) -> bool:
         """Hand a status to all analyzers that match; return whether one has taken it."""
         self.match(item.name)
-        taken = [one.analyze(item) for one in self._matches[item.name]]
+        taken = [analyzer.analyze(item) for analyzer in self._matches[item.name]]
         return any(taken)
 
     def report(self, now: int) -> list[DiagnosticStatus]:
-        """Return what the analyzers report, and the sum of it unless this is the root."""
+        """Return the statuses of the analyzers, and their sum unless this is the root."""
         if not self._analyzers:
             name = "/AnalyzerGroup" if self.path == "/" else self.path
             return [DiagnosticStatus(level=_ERROR, name=name, message="No analyzers")]
-        found: list[DiagnosticStatus] = []
+        statuses: list[DiagnosticStatus] = []
         head = DiagnosticStatus(name=self.path)
         levels: list[int] = []
         for analyzer in self._analyzers:
             for status in analyzer.report(now):
-                found.append(status)
+                statuses.append(status)
                 if status.name == analyzer.path:
                     levels.append(status.level)
                     head.values.append(KeyValue(analyzer.name, status.message))
         if self.path != "/":
             head.level = _sum(levels) if levels else _OK
             head.message = _TEXTS[head.level]
-            found.append(head)
-        return found + [item.status(self.path, stale=True) for item in self._unusable]
+            statuses.append(head)
+        return statuses + [item.status(self.path, stale=True) for item in self._unusable]
 
 
-_CLASSES: dict[str, Callable[[str, Mapping[str, Any], NodeLog, int], Analyzer]] = {
+_Make = Callable[[str, Mapping[str, Any], NodeLog, int], Section | AnalyzerGroup]
+_CLASSES: dict[str, _Make] = {
     one.__name__: one for one in (AnalyzerGroup, DiscardAnalyzer, GenericAnalyzer, IgnoreAnalyzer)
 }
-
-
 _TYPES = " or ".join(f"diagnostic_aggregator/{name}" for name in _CLASSES)
 
 
@@ -403,11 +344,7 @@ def _patterns(texts: Iterable[str], log: NodeLog) -> Iterable[re.Pattern[str]]:
 
 
 class Aggregator:
-    """Takes the statuses of ``/diagnostics``, and publishes the tree.
-
-    Args:
-        node: The node, whose parameters describe the analyzers.
-    """
+    """Takes the statuses of ``/diagnostics``, and publishes the tree that its parameters set."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -441,15 +378,15 @@ class Aggregator:
         """Publish the tree, and the worst level in it."""
         now = self._node.now()
         with self._lock:
-            found = self._group.report(now)
+            statuses = self._group.report(now)
             others = self._others.report(now)
         if len(others) > 1:
             if self._others_are_errors:
                 others[0].level = _ERROR
                 others[0].message = 'Unanalyzed items found in "Other"'
-            found += others
-        self._tree.publish(DiagnosticArray(Header(stamp=Time.from_nsec(now)), found))
-        levels = [status.level for status in found]
+            statuses += others
+        self._tree.publish(DiagnosticArray(Header(stamp=Time.from_nsec(now)), statuses))
+        levels = [status.level for status in statuses]
         level = _sum(levels) if levels else _NONE
         self._state.publish(DiagnosticStatus(level=level, name="toplevel_state"))
 

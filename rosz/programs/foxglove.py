@@ -9,15 +9,13 @@ from rosz.bridges.foxglove import (
     CAPABILITIES,
     PORT,
     SHOWN,
-    Limits,
+    FoxgloveLimits,
+    FoxgloveSettings,
     Offer,
-    Settings,
     open_bridge,
 )
 from rosz.errors import UsageError
 from rosz.node import Node
-
-__all__ = ("serve_foxglove",)
 
 T = TypeVar("T")
 
@@ -43,7 +41,7 @@ def serve_foxglove() -> None:
         certificate, key = _get(node, "certfile", ""), _get(node, "keyfile", "")
         if tls and not (certificate and key):
             raise UsageError("'~tls' is true: '~certfile' and '~keyfile' have to name files, too")
-        settings = Settings(
+        settings = FoxgloveSettings(
             host="0.0.0.0" if address in _EVERYWHERE else address,  # noqa: S104  # as asked
             port=_get(node, "port", PORT),
             password_file=_get(node, "password_file", ""),
@@ -53,7 +51,9 @@ def serve_foxglove() -> None:
             published=_patterns(node, "client_topic_whitelist"),
             certificate=certificate if tls else "",
             key=key if tls else "",
-            limits=Limits(waiting=_get(node, "send_buffer_limit", Limits().waiting)),
+            limits=FoxgloveLimits(
+                waiting=_get(node, "send_buffer_limit", FoxgloveLimits().waiting)
+            ),
             offer=Offer(
                 _capabilities(node),
                 _get(node, "include_hidden", default=False),
@@ -68,11 +68,7 @@ def serve_foxglove() -> None:
 
 
 def _get(node: Node, name: str, default: T) -> T:
-    """Return a parameter of the type of its default.
-
-    Raises:
-        UsageError: It is of another type.
-    """
+    """Return a parameter of the type of its default."""
     value = node.params.get(f"~{name}", default)
     if type(value) is not type(default):
         raise UsageError(f"parameter '~{name}' is {value!r}: expected a value such as {default!r}")
@@ -82,22 +78,22 @@ def _get(node: Node, name: str, default: T) -> T:
 def _names(node: Node, name: str) -> tuple[str, ...]:
     value: Any = node.params.get(f"~{name}", [])
     names = value if isinstance(value, list) else [value]
-    if not all(isinstance(one, str) for one in names):
+    if not all(isinstance(name, str) for name in names):
         raise UsageError(f"parameter '~{name}' is {value!r}: expected a list of texts")
     return tuple(names)
 
 
 def _patterns(node: Node, name: str) -> tuple[re.Pattern[str], ...]:
     """Return the regular expressions in a parameter; none means all."""
-    found = []
+    patterns = []
     for text in _names(node, name):
         try:
-            found.append(re.compile(text, re.ASCII))
+            patterns.append(re.compile(text, re.ASCII))
         except re.error as error:
             raise UsageError(
                 f"parameter '~{name}' has {text!r}, which is not a regular expression: {error}"
             ) from error
-    return tuple(found)
+    return tuple(patterns)
 
 
 def _capabilities(node: Node) -> tuple[str, ...]:
@@ -107,4 +103,4 @@ def _capabilities(node: Node) -> tuple[str, ...]:
             f"parameter '~capabilities' has '{unknown.pop()}': expected some of"
             f" {', '.join(CAPABILITIES)}"
         )
-    return tuple(one for one in CAPABILITIES if one in names) if names else CAPABILITIES
+    return tuple(feature for feature in CAPABILITIES if feature in names) if names else CAPABILITIES

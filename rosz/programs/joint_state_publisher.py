@@ -19,9 +19,6 @@ from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.sensor_msgs.msg import JointState
 from rosz.node import Node, serve_loggers
 
-__all__ = ("DescriptionError", "Joint", "JointStatePublisher", "Mimic", "main")
-
-_NANOSECONDS = 1_000_000_000
 _RIGID = frozenset({"fixed", "floating", "planar"})
 
 
@@ -30,14 +27,11 @@ class DescriptionError(RoszError):
 
 
 class Joint(msgspec.Struct):
-    """A joint with a state of its own.
+    """A joint with a state of its own, within limits.
+
+    A part of the state is None until another topic has it, if it has no default.
 
     Attributes:
-        least: Lower limit.
-        most: Upper limit.
-        position: Position, or None if it is not published until it is heard.
-        velocity: Velocity, likewise.
-        effort: Effort, likewise.
         continuous: Whether it goes on at the lower limit when it has reached the upper one.
         forward: Whether ``delta`` moves it forward.
     """
@@ -62,27 +56,44 @@ class Joint(msgspec.Struct):
 
 
 class Mimic(msgspec.Struct, frozen=True):
-    """A joint that follows another one.
-
-    Attributes:
-        parent: The other joint.
-        factor: Factor of its position and velocity.
-        offset: Number added to its position, in radians or metres.
-    """
+    """A joint that follows another one; the offset is in radians or metres."""
 
     parent: str
     factor: float = 1.0
     offset: float = 0.0
 
+    @classmethod
+    def of(cls, joint: ET.Element) -> Mimic | None:
+        """Return the ``<mimic>`` of a joint; None if it has none.
+
+        Raises:
+            ValueError: A number in it is not one.
+        """
+        mimic = joint.find("mimic")
+        if mimic is None:
+            return None
+        factor, offset = float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))
+        return cls(mimic.get("joint", ""), factor, offset)
+
+
+def parse_description(description: object) -> ET.Element:
+    """Return the root element of the value of ``robot_description``, which has to be XML."""
+    if not isinstance(description, str):
+        raise DescriptionError(
+            "parameter 'robot_description' is not set, or is not a text: it is the URDF of the"
+            ' robot, such as <param name="robot_description" command="xacro FILE"/>'
+        )
+    try:
+        return ET.fromstring(description)  # noqa: S314  # a parameter of this system
+    except ET.ParseError as error:
+        raise DescriptionError(f"parameter 'robot_description' is not XML: {error}") from error
+
 
 class JointStatePublisher:
-    """Publish the states of all joints.
-
-    Args:
-        node: The node, whose parameters describe the robot.
+    """Publish the states of all joints of the robot that the parameters of a node describe.
 
     Raises:
-        DescriptionError: There is no usable description, or joints follow each other in a ring.
+        DescriptionError: The description is missing or not valid, or its joints form a ring.
     """
 
     def __init__(self, node: Node) -> None:
@@ -92,7 +103,7 @@ class JointStatePublisher:
         self.names: list[str] = []
         for name, given in (self._param("dependent_joints", {}) or {}).items():
             self.mimics[name] = _mimic(name, given)
-        self._read(self._describe())
+        self._read(parse_description(self._param("robot_description", None)))
         self._followed = {name: self._follow(name) for name in self.names if name in self.mimics}
         self._publisher = node.publisher("joint_states", JointState, queue_size=5)
         for topic in self._param("source_list", []) or []:
@@ -102,29 +113,17 @@ class JointStatePublisher:
         params = self._node.params
         return params.get(f"~{name}", None) if params.has(f"~{name}") else params.get(name, default)
 
-    def _describe(self) -> ET.Element:
-        description = self._param("robot_description", None)
-        if not isinstance(description, str):
-            raise DescriptionError(
-                "parameter 'robot_description' is not set, or is not a text: it is the URDF of the"
-                ' robot, such as <param name="robot_description" command="xacro FILE"/>'
-            )
-        try:
-            return ET.fromstring(description)  # noqa: S314  # a parameter of this system
-        except ET.ParseError as error:
-            raise DescriptionError(f"parameter 'robot_description' is not XML: {error}") from error
-
     def _read(self, robot: ET.Element) -> None:
         """Read the joints of a URDF, or of a COLLADA document."""
         if robot.tag.rpartition("}")[2] == "COLLADA":
             self._read_collada(robot)
             return
-        found = robot if robot.tag == "robot" else robot.find(".//robot")
-        if found is None:
+        model = robot if robot.tag == "robot" else robot.find(".//robot")
+        if model is None:
             raise DescriptionError(
                 f"parameter 'robot_description' has <{robot.tag}>; expected <robot> (URDF)"
             )
-        for element in found.findall("joint"):
+        for element in model.findall("joint"):
             kind = element.get("type", "")
             if kind not in _RIGID:
                 self._read_joint(element, element.get("name", ""), kind)
@@ -145,10 +144,9 @@ class JointStatePublisher:
         if safety is not None and self._param("use_smallest_joint_limits", True):
             least = max(least, float(safety.get("soft_lower_limit", least)))
             most = min(most, float(safety.get("soft_upper_limit", most)))
-        mimic = element.find("mimic")
-        if mimic is not None and self._param("use_mimic_tags", True):
-            factor, offset = float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))
-            self.mimics[name] = Mimic(mimic.get("joint", ""), factor, offset)
+        mimic = Mimic.of(element) if self._param("use_mimic_tags", True) else None
+        if mimic is not None:
+            self.mimics[name] = mimic
         if name in self.mimics:
             return
         zero = self._param(f"zeros/{name}", None)
@@ -177,22 +175,22 @@ class JointStatePublisher:
 
     def _follow(self, name: str) -> Mimic:
         """Return the free joint that a joint follows, also by way of others."""
-        found = self.mimics[name]
+        mimic = self.mimics[name]
         seen = [name]
-        while found.parent in self.mimics:
-            if found.parent in seen:
-                ring = ", ".join([*seen, found.parent])
+        while mimic.parent in self.mimics:
+            if mimic.parent in seen:
+                ring = ", ".join([*seen, mimic.parent])
                 raise DescriptionError(f"Found an infinite recursive mimic chain: [{ring}]")
-            seen.append(found.parent)
-            above = self.mimics[found.parent]
-            found = Mimic(
+            seen.append(mimic.parent)
+            above = self.mimics[mimic.parent]
+            mimic = Mimic(
                 above.parent,
-                found.factor * above.factor,
-                found.offset + found.factor * above.offset,
+                mimic.factor * above.factor,
+                mimic.offset + mimic.factor * above.offset,
             )
-        if found.parent not in self.joints:
-            raise DescriptionError(f"joint '{name}' follows '{found.parent}', which is not a joint")
-        return found
+        if mimic.parent not in self.joints:
+            raise DescriptionError(f"joint '{name}' follows '{mimic.parent}', which is not a joint")
+        return mimic
 
     def hear(self, message: JointState) -> None:
         """Take the states of joints from a message of another node."""
@@ -211,7 +209,7 @@ class JointStatePublisher:
         """Return the states of all joints at this time."""
         free = self.joints.values()
         message = JointState(name=list(self.names))
-        message.header.stamp = Time(*divmod(self._node.now(), _NANOSECONDS))
+        message.header.stamp = Time.from_nsec(self._node.now())
         if self.mimics or any(joint.position is not None for joint in free):
             message.position = self._values("position")
         if any(joint.velocity is not None for joint in free):
@@ -221,7 +219,7 @@ class JointStatePublisher:
         return message
 
     def _values(self, field: str) -> list[float]:
-        found = []
+        values = []
         for name in self.names:
             mimic = self._followed.get(name) or Mimic(name)
             joint = self.joints.get(mimic.parent)
@@ -229,8 +227,8 @@ class JointStatePublisher:
             if value is not None and field != "effort":
                 value *= mimic.factor
                 value += mimic.offset if field == "position" else 0.0
-            found.append(value or 0.0)
-        return found
+            values.append(value or 0.0)
+        return values
 
     def run(self) -> None:
         """Publish at ``rate`` until the node is shut down."""

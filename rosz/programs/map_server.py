@@ -22,11 +22,9 @@ from rosz.msgs.geometry_msgs.msg import Point, Pose, Quaternion
 from rosz.msgs.nav_msgs.msg import MapMetaData, OccupancyGrid
 from rosz.msgs.nav_msgs.srv import GetMap, LoadMap
 from rosz.node import Node, serve_loggers
+from rosz.remap import parse
 from rosz.transforms import to_rpy
 
-__all__ = ("Image", "MapError", "load_map", "main", "occupancy", "read_image", "save", "write_map")
-
-_NANOSECONDS = 1_000_000_000
 _MODES = ("trinary", "scale", "raw")
 _UNKNOWN = -1
 _FREE_PIXEL, _UNKNOWN_PIXEL, _OCCUPIED_PIXEL = 254, 205, 0
@@ -44,11 +42,8 @@ class Image(msgspec.Struct, frozen=True):
     """An image as bytes, row by row from the top.
 
     Attributes:
-        width: Pixels of a row.
-        height: Number of rows.
         channels: Bytes of a pixel.
         alpha: Whether the last one of them is its opacity.
-        data: The bytes.
     """
 
     width: int
@@ -59,11 +54,7 @@ class Image(msgspec.Struct, frozen=True):
 
 
 def read_image(path: Path) -> Image:
-    """Read an image.
-
-    Raises:
-        MapError: It cannot be read, or is of a kind that needs Pillow, which is not installed.
-    """
+    """Read an image; kinds other than PGM need Pillow."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -118,19 +109,19 @@ def occupancy(image: Image, *, negate: bool, occupied: float, free: float, mode:
         mode: ``trinary`` (0, 100 or -1), ``scale`` (values between as well) or ``raw`` (as it is).
     """
     averaged = image.channels - (image.alpha and mode != "trinary")
-    known: dict[bytes, int] = {}
+    cell_of_pixel: dict[bytes, int] = {}
     width, size = image.width, image.channels
     cells = array("b")
     for row in range(image.height - 1, -1, -1):
         line = image.data[row * width * size : (row + 1) * width * size]
         for at in range(0, len(line), size):
             pixel = line[at : at + size]
-            value = known.get(pixel)
+            value = cell_of_pixel.get(pixel)
             if value is None:
                 mean = sum(pixel[:averaged]) / averaged
                 shade = _WHITE - mean if negate else mean
                 opaque = not image.alpha or pixel[-1] >= 1
-                value = known[pixel] = _cell(shade, occupied, free, mode, opaque=opaque)
+                value = cell_of_pixel[pixel] = _cell(shade, occupied, free, mode, opaque=opaque)
             cells.append(value)
     return cells
 
@@ -150,47 +141,43 @@ def _cell(shade: float, occupied: float, free: float, mode: str, *, opaque: bool
 
 
 def load_map(path: Path) -> OccupancyGrid:
-    """Read a map from its YAML file, without a frame or times.
-
-    Raises:
-        MapError: The file or its image cannot be used; the text says what is wrong.
-    """
+    """Read a map from its YAML file, without a frame or times."""
     try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+        fields = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise MapError(f"map '{path}' cannot be read: {error.strerror}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise MapError(f"map '{path}' is not YAML: {error}") from error
-    if not isinstance(found, dict):
+    if not isinstance(fields, dict):
         raise MapError(f"map '{path}' has no fields; expected image, resolution, origin …")
-    mode = found.get("mode", "trinary")
+    mode = fields.get("mode", "trinary")
     if mode not in _MODES:
         raise MapError(f"map '{path}': mode is '{mode}'; expected one of {', '.join(_MODES)}")
-    image = _field(found, "image", path)
+    image = _field(fields, "image", path)
     if not isinstance(image, str) or not image:
         raise MapError(f"map '{path}': image is {image!r}; expected the path of an image")
-    origin = _field(found, "origin", path)
+    origin = _field(fields, "origin", path)
     if not isinstance(origin, list) or len(origin) < len("xyt"):
         raise MapError(f"map '{path}': origin is {origin!r}; expected [x, y, yaw]")
     return _grid(
         read_image(path.parent / image),
-        resolution=_number(found, "resolution", path),
-        origin=[float(one) for one in origin],
-        negate=bool(_number(found, "negate", path)),
-        occupied=_number(found, "occupied_thresh", path),
-        free=_number(found, "free_thresh", path),
+        resolution=_number(fields, "resolution", path),
+        origin=[float(number) for number in origin],
+        negate=bool(_number(fields, "negate", path)),
+        occupied=_number(fields, "occupied_thresh", path),
+        free=_number(fields, "free_thresh", path),
         mode=mode,
     )
 
 
-def _field(found: dict[str, Any], name: str, path: Path) -> Any:
-    if name not in found:
+def _field(fields: dict[str, Any], name: str, path: Path) -> Any:
+    if name not in fields:
         raise MapError(f"map '{path}' has no '{name}'")
-    return found[name]
+    return fields[name]
 
 
-def _number(found: dict[str, Any], name: str, path: Path) -> float:
-    value = _field(found, name, path)
+def _number(fields: dict[str, Any], name: str, path: Path) -> float:
+    value = _field(fields, name, path)
     try:
         return float(value)
     except (TypeError, ValueError):
@@ -221,7 +208,7 @@ class _MapServer:
         node.service("change_map", LoadMap, self._change)
 
     def _publish(self, grid: OccupancyGrid) -> None:
-        now = Time(*divmod(self._node.now(), _NANOSECONDS))
+        now = Time.from_nsec(self._node.now())
         grid.info.map_load_time = now
         grid.header.stamp = now
         grid.header.frame_id = self._frame
@@ -250,7 +237,7 @@ class _MapServer:
 
 def main() -> None:
     """Serve the map of the command line: a YAML file, or an image and a resolution."""
-    words = [word for word in sys.argv[1:] if ":=" not in word]
+    words = parse(sys.argv[1:]).rest
     if len(words) not in {1, 2}:
         sys.exit("usage: map_server MAP.yaml")
     with Node("map_server", anonymous=True) as node:
@@ -290,9 +277,6 @@ def write_map(grid: OccupancyGrid, name: str, *, occupied: int, free: int) -> No
         name: Path without a suffix.
         occupied: Least value of an occupied cell.
         free: Largest value of a free cell.
-
-    Raises:
-        MapError: A file cannot be written.
     """
     info = grid.info
     pixels = bytes(
@@ -322,7 +306,7 @@ def write_map(grid: OccupancyGrid, name: str, *, occupied: int, free: int) -> No
 
 def save() -> None:
     """Write the next map that comes on ``map``."""
-    name, occupied, free = _save_options([word for word in sys.argv[1:] if ":=" not in word])
+    name, occupied, free = _save_options(list(parse(sys.argv[1:]).rest))
     with Node("map_saver") as node:
         serve_loggers(node)
         node.log.info("Waiting for the map")

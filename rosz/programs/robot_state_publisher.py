@@ -14,12 +14,12 @@ from xml.etree import ElementTree as ET
 
 import msgspec
 
-from rosz.errors import RoszError
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.sensor_msgs.msg import JointState
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node, serve_loggers
+from rosz.programs.joint_state_publisher import DescriptionError, Mimic, parse_description
 from rosz.transforms import (
     Pose,
     StaticTransformBroadcaster,
@@ -27,8 +27,6 @@ from rosz.transforms import (
     compose,
     from_rpy,
 )
-
-__all__ = ("Link", "RobotError", "RobotStatePublisher", "main", "read_links")
 
 _NANOSECONDS = 1_000_000_000
 _FIXED_AHEAD = _NANOSECONDS // 2
@@ -38,23 +36,14 @@ _MOVING = _TURNING | {"prismatic"}
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 
 
-class RobotError(RoszError):
-    """The description of the robot cannot be used."""
-
-
-class Link(msgspec.Struct, frozen=True):
+class RobotLink(msgspec.Struct, frozen=True):
     """A link, and the joint that it hangs on.
 
     Attributes:
-        parent: Name of the parent link.
-        child: Name of the link.
-        joint: Name of the joint.
         kind: Type of the joint, as URDF names it.
         origin: Pose of the joint in the parent.
         axis: Axis of the motion, of length 1.
-        mimics: Joint that this one follows; empty for none.
-        factor: Factor of the position of that joint.
-        offset: Number added then, in radians or metres.
+        mimic: The joint that this one follows; None if it follows none.
     """
 
     parent: str
@@ -63,9 +52,7 @@ class Link(msgspec.Struct, frozen=True):
     kind: str
     origin: Pose
     axis: tuple[float, float, float]
-    mimics: str = ""
-    factor: float = 1.0
-    offset: float = 0.0
+    mimic: Mimic | None = None
 
     @property
     def moves(self) -> bool:
@@ -73,11 +60,7 @@ class Link(msgspec.Struct, frozen=True):
         return self.kind in _MOVING
 
     def pose(self, position: float = 0.0) -> Pose:
-        """Return the pose in the parent.
-
-        Args:
-            position: Position of the joint, in radians or metres.
-        """
+        """Return the pose in the parent at a position of the joint, in radians or metres."""
         if not self.moves:
             return self.origin
         x, y, z = self.axis
@@ -88,54 +71,45 @@ class Link(msgspec.Struct, frozen=True):
         return compose(self.origin, Pose((0.0, 0.0, 0.0), (x * sine, y * sine, z * sine, cosine)))
 
 
-def read_links(description: str) -> list[Link]:
-    """Return the links of a URDF that have a parent, without those on floating joints.
-
-    Raises:
-        RobotError: It is not XML or not a URDF, or a joint is not well-formed.
-    """
-    try:
-        robot = ET.fromstring(description)  # noqa: S314  # a parameter of this system
-    except ET.ParseError as error:
-        raise RobotError(f"the description of the robot is not XML: {error}") from error
+def read_links(description: object) -> list[RobotLink]:
+    """Return the links of a URDF that have a parent, without those on floating joints."""
+    robot = parse_description(description)
     if robot.tag != "robot":
-        raise RobotError(f"the description of the robot has <{robot.tag}>; expected <robot> (URDF)")
+        raise DescriptionError(
+            f"the description of the robot has <{robot.tag}>; expected <robot> (URDF)"
+        )
     names = {link.get("name", "") for link in robot.findall("link")}
-    found = [_read(joint, names) for joint in robot.findall("joint")]
-    return [link for link in found if link.kind != "floating"]
+    links = [_read(joint, names) for joint in robot.findall("joint")]
+    return [link for link in links if link.kind != "floating"]
 
 
-def _read(joint: ET.Element, names: set[str]) -> Link:
+def _read(joint: ET.Element, names: set[str]) -> RobotLink:
     name = joint.get("name", "")
     ends = {}
     for role in ("parent", "child"):
         element = joint.find(role)
         ends[role] = "" if element is None else element.get("link", "")
         if ends[role] not in names:
-            raise RobotError(
+            raise DescriptionError(
                 f"joint '{name}': its {role} '{ends[role]}' is not a link of the robot"
             )
-    origin, axis, mimic = (joint.find(tag) for tag in ("origin", "axis", "mimic"))
+    origin, axis = joint.find("origin"), joint.find("axis")
     try:
         roll, pitch, yaw = _numbers(origin, "rpy", "0 0 0")
         pose = Pose(_numbers(origin, "xyz", "0 0 0"), from_rpy(roll, pitch, yaw))
         direction = _numbers(axis, "xyz", "1 0 0")
-        factor, offset = 1.0, 0.0
-        if mimic is not None:
-            factor, offset = float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))
+        mimic = Mimic.of(joint)
     except ValueError as error:
-        raise RobotError(f"joint '{name}': {error}; expected three numbers") from error
+        raise DescriptionError(f"joint '{name}': {error}; expected three numbers") from error
     length = math.hypot(*direction) or 1.0
-    return Link(
+    return RobotLink(
         ends["parent"],
         ends["child"],
         name,
         joint.get("type", ""),
         pose,
         (direction[0] / length, direction[1] / length, direction[2] / length),
-        "" if mimic is None else mimic.get("joint", ""),
-        factor,
-        offset,
+        mimic,
     )
 
 
@@ -146,24 +120,21 @@ def _numbers(element: ET.Element | None, name: str, default: str) -> tuple[float
 
 
 class RobotStatePublisher:
-    """Publish the frames of a robot.
-
-    Args:
-        node: The node, whose parameters describe the robot.
+    """Publish the frames of the robot that the parameters of a node describe.
 
     Raises:
-        RobotError: There is no usable description.
+        DescriptionError: The description is missing or not valid.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
         params = node.params
-        links = read_links(self._searched("robot_description", None))
-        self._prefix = str(self._searched("tf_prefix", "")).strip("/")
+        links = read_links(self._searched("robot_description"))
+        self._prefix = str(self._searched("tf_prefix") or "").strip("/")
         self._ignore_stamp = bool(params.get("~ignore_timestamp", False))
         frequency = float(params.get("~publish_frequency", _FREQUENCY))
         if frequency <= 0:
-            raise RobotError(f"~publish_frequency is {frequency:g}; expected above 0")
+            raise DescriptionError(f"~publish_frequency is {frequency:g}; expected above 0")
         self._interval = round(_NANOSECONDS / frequency)
         self._fixed = [link for link in links if not link.moves]
         self._moving = {link.joint: link for link in links if link.moves}
@@ -178,15 +149,9 @@ class RobotStatePublisher:
             node.timer(1 / frequency, lambda _: self._send_fixed())
         node.subscription("joint_states", JointState, self.receive, queue_size=1)
 
-    def _searched(self, name: str, default: str | None) -> str:
-        found = self._node.params.search(name)
-        value: object = default if found is None else self._node.params.get(found)
-        if isinstance(value, str):
-            return value
-        raise RobotError(
-            f"parameter '{name}' is not set, or is not a text: it is the URDF of the robot, such as"
-            ' <param name="robot_description" command="xacro FILE"/>'
-        )
+    def _searched(self, name: str) -> object:
+        path = self._node.params.search(name)
+        return None if path is None else self._node.params.get(path)
 
     def _send_fixed(self) -> None:
         # Dated ahead, so that they are valid until the next ones come.
@@ -216,16 +181,16 @@ class RobotStatePublisher:
         self._published.update(dict.fromkeys(state.name, stamp))
 
     def _moved(self, positions: Mapping[str, float], stamp: int) -> list[TransformStamped]:
-        found: list[TransformStamped] = []
+        transforms: list[TransformStamped] = []
         for link in self._moving.values():
             position = positions.get(link.joint)
-            if link.mimics in positions:
-                position = positions[link.mimics] * link.factor + link.offset
+            if link.mimic is not None and link.mimic.parent in positions:
+                position = positions[link.mimic.parent] * link.mimic.factor + link.mimic.offset
             if position is not None:
-                found.append(self._transform(link, position, stamp))
-        return found
+                transforms.append(self._transform(link, position, stamp))
+        return transforms
 
-    def _transform(self, link: Link, position: float, stamp: int) -> TransformStamped:
+    def _transform(self, link: RobotLink, position: float, stamp: int) -> TransformStamped:
         pose = link.pose(position)
         header = Header(stamp=Time.from_nsec(stamp), frame_id=self._name(link.parent))
         transform = Transform(Vector3(*pose.translation), Quaternion(*pose.rotation))
@@ -246,6 +211,6 @@ def main() -> None:
         serve_loggers(node)
         try:
             RobotStatePublisher(node)
-        except RobotError as error:
+        except DescriptionError as error:
             sys.exit(f"robot_state_publisher: {error}")
         node.spin()

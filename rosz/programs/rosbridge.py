@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from rosz.bridges.gate import Gate
-from rosz.bridges.websocket import RosApi, Settings, open_bridge
+from rosz.access import AccessPolicy
+from rosz.bridges.rosbridge import RosApi, RosbridgeSettings, open_bridge
 from rosz.errors import UsageError
 from rosz.node import Node
 from rosz.transforms import Republisher
-
-__all__ = ("serve_rosapi", "serve_transforms", "serve_websocket")
 
 _LOOK_SECONDS = 5.0
 _EVERYWHERE = ("", "0.0.0.0")  # noqa: S104  # what rosbridge_suite's parameter may be
@@ -32,7 +30,7 @@ def serve_websocket() -> None:
     with Node("rosbridge_websocket") as node:
         address = str(_get(node, "address", "127.0.0.1"))
         certificate = str(_get(node, "certfile", ""))
-        settings = Settings(
+        settings = RosbridgeSettings(
             host="0.0.0.0" if address in _EVERYWHERE else address,  # noqa: S104  # as asked
             port=_port(_get(node, "port", 9090)),
             password_file=str(_get(node, "password_file", "")),
@@ -55,12 +53,12 @@ def serve_websocket() -> None:
 def serve_rosapi() -> None:
     """Serve the services of rosapi below ``/rosapi``, until the node ends."""
     with Node("rosapi") as node:
-        gate = Gate(
+        policy = AccessPolicy(
             topics=_patterns(node, "topics_glob"),
             services=_patterns(node, "services_glob"),
             params=_patterns(node, "params_glob"),
         )
-        RosApi(node).serve(gate, "ros1")
+        RosApi(node).serve(policy, "ros1")
         node.spin()
 
 
@@ -102,4 +100,5 @@ def _patterns(node: Node, name: str) -> tuple[str, ...]:
     """Return the patterns in a parameter such as ``[/odom, /camera/*]``; none means all."""
     value = _get(node, name, "")
     parts = value if isinstance(value, list) else str(value).strip().strip("[]").split(",")
-    return tuple(found for one in parts if (found := str(one).strip().strip("'\"")))
+    patterns = (str(part).strip().strip("'\"") for part in parts)
+    return tuple(filter(None, patterns))

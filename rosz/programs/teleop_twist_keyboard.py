@@ -13,9 +13,6 @@ from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node, serve_loggers
 from rosz.turtlesim.teleop import Keyboard
 
-__all__ = ("Driver", "main")
-
-_NANOSECONDS = 1_000_000_000
 _WAIT_SECONDS = 2.0
 _HELP_INTERVAL = 15
 _HELP = """
@@ -69,14 +66,11 @@ _SPEEDS = {
 _STILL = (0, 0, 0, 0)
 
 
-class Driver:
-    """Commands from keys.
+class KeyboardDriver:
+    """Commands from keys, on ``cmd_vel``.
 
     Its private parameters are those of ROS 1: ``speed``, ``turn``, their limits ``speed_limit`` and
     ``turn_limit``, ``repeat_rate``, and ``stamped`` with ``frame_id``.
-
-    Args:
-        node: The node, which publishes ``cmd_vel``.
     """
 
     def __init__(self, node: Node) -> None:
@@ -100,11 +94,7 @@ class Driver:
             node.timer(1 / rate, lambda _: self._publish())
 
     def wait(self) -> None:
-        """Wait until somebody subscribes to the commands.
-
-        Raises:
-            ClosedError: The node ends first.
-        """
+        """Wait until somebody subscribes to the commands, or until the node ends (ClosedError)."""
         while True:
             try:
                 self._commands.wait_for_subscribers(timeout=_WAIT_SECONDS)
@@ -114,11 +104,7 @@ class Driver:
                 return
 
     def press(self, key: str) -> None:
-        """Handle a key, or that none came in time.
-
-        Args:
-            key: The key; empty for none.
-        """
+        """Handle a key, or that none came in time if it is empty."""
         if key in _SPEEDS:
             self._change(*_SPEEDS[key])
         elif key in _MOVES:
@@ -158,7 +144,7 @@ class Driver:
             if not self._stamped:
                 self._commands.publish(twist)
                 return
-            now = Time(*divmod(self._node.now(), _NANOSECONDS))
+            now = Time.from_nsec(self._node.now())
             self._commands.publish(Header(stamp=now, frame_id=self._frame), twist)
 
 
@@ -171,7 +157,7 @@ def main() -> None:
     """Read keys until Ctrl-C or the end of the input."""
     with Node("teleop_twist_keyboard") as node:
         serve_loggers(node)
-        driver = Driver(node)
+        driver = KeyboardDriver(node)
         node.context.cooperative = True
         try:
             driver.wait()

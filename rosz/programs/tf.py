@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rosz.errors import ParamNotFound, RoszError, TransformError, UsageError
-from rosz.message.convert import from_plain
+from rosz.message import from_plain
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node, serve_loggers
+from rosz.remap import parse
 from rosz.transforms import (
     Buffer,
     Monitor,
@@ -28,25 +29,14 @@ from rosz.transforms import (
     tree_as_dot,
 )
 
-__all__ = (
-    "leading_number",
-    "parse_transform",
-    "static_transform_publisher",
-    "static_transform_publisher_of_tf2",
-    "tf_echo",
-    "tf_monitor",
-    "view_frames",
-)
-
 _NANOSECONDS = 1_000_000_000
 _LEADING_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_WRONG_WORDS = 255
+_WRONG_WORDS = 255  # ROS 1's programs return -1
 _MILLISECONDS = 1000
 _EULER, _QUATERNION = 6, 7
 _FIRST_TIMEOUT = _NANOSECONDS
-_LISTEN_SECONDS = 5.0
+_LISTEN_SECONDS = 5.0  # as in ROS 1
 _MONITOR_SECONDS = 0.2
-_SLEEP_SECONDS = 0.01
 
 _TF_USAGE = """\
 usage: static_transform_publisher x y z yaw pitch roll frame_id child_frame_id period_in_ms
@@ -63,11 +53,6 @@ Prints the pose of the target frame in the source frame, RATE times a second (1)
 _MONITOR_USAGE = "usage: tf_monitor [FRAME FRAME]"
 
 
-def _words() -> list[str]:
-    """Return the command line without remappings and parameters."""
-    return [word for word in sys.argv[1:] if ":=" not in word]
-
-
 def _refuse(text: str) -> NoReturn:
     """End with the exit code of the programs of ROS 1 for wrong words."""
     sys.stderr.write(f"{text}\n")
@@ -82,11 +67,7 @@ def _numbers(words: Sequence[str], read: Callable[[str], float] = float) -> list
 
 
 def leading_number(word: str) -> float:
-    """Return the number that a word begins with, as C's ``atof`` reads ``0,`` and ``.5m``.
-
-    Raises:
-        ValueError: It begins with none.
-    """
+    """Return the number that a word begins with, as C's ``atof`` reads ``0,`` and ``.5m``."""
     match = _LEADING_NUMBER.match(word)
     return float(match[0] if match else word)
 
@@ -112,9 +93,6 @@ def parse_transform(words: Sequence[str], read: Callable[[str], float] = float) 
         words: ``x y z yaw pitch roll frame child`` in metres and radians, or
             ``x y z qx qy qz qw frame child``.
         read: Function that reads a number, and raises ValueError if it is none.
-
-    Raises:
-        UsageError: It is neither, a number is not valid, or both frames are the same.
     """
     if len(words) not in {_EULER + 2, _QUATERNION + 2}:
         raise UsageError(f"got {len(words)} arguments, expected {_EULER + 2} or {_QUATERNION + 2}")
@@ -134,7 +112,7 @@ def parse_transform(words: Sequence[str], read: Callable[[str], float] = float) 
 
 def static_transform_publisher() -> None:
     """Publish a transform on ``/tf`` again and again, as the program of tf does."""
-    words = _words()
+    words = list(parse(sys.argv[1:]).rest)
     try:
         transform = parse_transform(words[:-1], leading_number)
         period = _positive("the period in ms", words[-1]) / _MILLISECONDS
@@ -153,7 +131,7 @@ def static_transform_publisher() -> None:
 
 def static_transform_publisher_of_tf2() -> None:
     """Publish a transform on ``/tf_static``, as the program of tf2_ros does."""
-    words = _words()
+    words = list(parse(sys.argv[1:]).rest)
     with Node("static_transform_publisher", anonymous=True) as node:
         serve_loggers(node)
         try:
@@ -190,13 +168,13 @@ def _of_param(node: Node, name: str) -> TransformStamped:
     value: Any = node.params.get(name)
     if not isinstance(value, dict):
         raise UsageError(f"parameter '{name}' is {value!r:.60}; expected a TransformStamped")
-    found: TransformStamped = from_plain(TransformStamped, value)
-    return found
+    transform: TransformStamped = from_plain(TransformStamped, value)
+    return transform
 
 
 def tf_echo() -> None:
     """Print the transform between two frames periodically."""
-    words = _words()
+    words = list(parse(sys.argv[1:]).rest)
     with Node("tf_echo", anonymous=True) as node:
         try:
             source, target, *rest = (word.removeprefix("/") for word in _few(words))
@@ -227,20 +205,20 @@ def _echoed(buffer: Buffer, source: str, target: str, node: Node, precision: int
         pose, stamp = buffer.lookup(source, target)
     except TransformError as error:
         now = node.now() / _NANOSECONDS
-        known = "".join(
-            f"Frame {name} exists with parent {one.newest.parent}.\n"
-            for name, one in buffer.histories().items()
+        listing = "".join(
+            f"Frame {name} exists with parent {history.newest.parent}.\n"
+            for name, history in buffer.histories().items()
         )
         return (
             f"Failure at {now:.9f}\nException thrown:{error}\n"
-            f"The current list of frames is:\n{known}\n"
+            f"The current list of frames is:\n{listing}\n"
         )
     return "".join(f"{line}\n" for line in describe_pose(pose, stamp, precision))
 
 
 def tf_monitor() -> None:
     """Print again and again by whom, how often and how late frames are published."""
-    words = [word.removeprefix("/") for word in _words()]
+    words = [word.removeprefix("/") for word in list(parse(sys.argv[1:]).rest)]
     if len(words) not in {0, 2}:
         _refuse(f"tf_monitor: expected no frames or two\n{_MONITOR_USAGE}")
     with Node("tf_monitor", anonymous=True) as node:
@@ -263,16 +241,16 @@ def _monitored(monitor: Monitor, words: Sequence[str], now: int) -> str:
         lines += [f"Chain is: {' -> '.join(wanted)}", f"Net delay     {delay:g}"]
     lines += ["", "Frames:"]
     lines += (
-        f"Frame: {one.frame} published by {one.node}{'(static)' * one.static} Average Delay:"
-        f" {one.mean_delay:g} Max Delay: {one.max_delay:g}"
-        for one in monitor.frames()
-        if wanted is None or one.frame in wanted
+        f"Frame: {report.frame} published by {report.node}{'(static)' * report.static}"
+        f" Average Delay: {report.mean_delay:g} Max Delay: {report.max_delay:g}"
+        for report in monitor.frames()
+        if wanted is None or report.frame in wanted
     )
     lines += ["", "All Broadcasters:"]
     lines += (
-        f"Node: {one.node} {one.rate:g} Hz, Average Delay: {one.mean_delay:g} Max Delay:"
-        f" {one.max_delay:g}"
-        for one in monitor.broadcasters()
+        f"Node: {report.node} {report.rate:g} Hz,"
+        f" Average Delay: {report.mean_delay:g} Max Delay: {report.max_delay:g}"
+        for report in monitor.broadcasters()
     )
     return "".join(f"{line}\n" for line in lines)
 

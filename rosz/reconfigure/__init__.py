@@ -3,17 +3,22 @@
 A server describes its settings and is called back when some change. A client reads and changes the
 settings of another node. May import everything up to the fifth floor.
 
-`PUBLIC_MODULES` are imported by name: `messages` by those who need settings as messages or
-dictionaries, `setting` by those who describe one.
+The public module `messages` translates settings to messages and dictionaries.
 """
 
 from rosz.reconfigure.client import Client, find_servers
-from rosz.reconfigure.description import Config, Description, Group
+from rosz.reconfigure.description import (
+    Choice,
+    Config,
+    Description,
+    Group,
+    Setting,
+    enumeration,
+)
 from rosz.reconfigure.files import dump, load
 from rosz.reconfigure.server import ALL_LEVELS, Server
-from rosz.reconfigure.setting import Choice, Setting, enumeration
 
-PUBLIC_MODULES = ("messages", "setting")
+PUBLIC_MODULES = ("messages",)
 
 __all__ = (
     "ALL_LEVELS",

@@ -8,9 +8,10 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from copy import deepcopy
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from rosz.errors import ClosedError, WaitTimeout, near_miss
+from rosz.lifecycle import Closing
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import ConfigDescription, GroupState
 from rosz.msgs.dynamic_reconfigure.srv import Reconfigure
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from rosz.graph import View
     from rosz.node import Node
 
-__all__ = ("Client", "find_servers")
+_T = TypeVar("_T")
 
 _UPDATE_TIMEOUT: Final = 0.5
 """Seconds that a change waits to receive its own update, so that older ones come before it."""
@@ -55,7 +56,7 @@ def find_servers(view: View) -> list[str]:
     )
 
 
-class Client:
+class Client(Closing):
     """Reads and changes the settings of another node, and is notified when they change.
 
     It may be created before the server, and outlives it: it goes on with a server that is started
@@ -133,11 +134,7 @@ class Client:
             WaitTimeout: The server did not send it in time.
             ClosedError: The client was closed meanwhile.
         """
-        self._wait_for(
-            lambda: self._description is not None, "description of the settings", timeout
-        )
-        assert self._description is not None  # noqa: S101  # what was waited for
-        return self._description
+        return self._wait_for(lambda: self._description, "description of the settings", timeout)
 
     def config(self, timeout: float | None = None) -> Config:
         """Return a copy of the current configuration; wait for it if it has not been received.
@@ -149,9 +146,7 @@ class Client:
             WaitTimeout: The server did not send it in time.
             ClosedError: The client was closed meanwhile.
         """
-        self._wait_for(lambda: self._config is not None, "configuration", timeout)
-        assert self._config is not None  # noqa: S101  # what was waited for
-        return deepcopy(self._config)
+        return deepcopy(self._wait_for(lambda: self._config, "configuration", timeout))
 
     def update(self, changes: Mapping[str, Any], timeout: float | None = None) -> Config:
         """Change settings.
@@ -218,14 +213,13 @@ class Client:
                 self._config = config
         return deepcopy(config)
 
-    def _wait_for(self, condition: Callable[[], bool], what: str, timeout: float | None) -> None:
+    def _wait_for(self, get: Callable[[], _T | None], what: str, timeout: float | None) -> _T:
         limit = self.timeout if timeout is None else timeout
         with self._changed:
-            if condition():
-                return
-            self._changed.wait_for(lambda: condition() or self._closed, limit)
-            if condition():
-                return
+            self._changed.wait_for(lambda: self._closed or get() is not None, limit)
+            value = get()
+            if value is not None:
+                return value
             if self._closed:
                 raise ClosedError(f"the client of '{self.name}' is closed")
         if self.name not in find_servers(self.node.context.graph.refresh()):
@@ -233,9 +227,11 @@ class Client:
         raise WaitTimeout(f"{what} from '{self.name}'", limit, _BUSY)
 
     def _no_server(self, timeout: float) -> WaitTimeout:
-        known = find_servers(self.node.context.graph.refresh())
-        listing = f"there are {', '.join(known)}" if known else "no node has any on this network"
-        hint = near_miss(self.name, known).removeprefix("; ") or listing
+        servers = find_servers(self.node.context.graph.refresh())
+        listing = (
+            f"there are {', '.join(servers)}" if servers else "no node has any on this network"
+        )
+        hint = near_miss(self.name, servers).removeprefix("; ") or listing
         return WaitTimeout(f"node with settings under '{self.name}'", timeout, hint)
 
     def _on_description(self, message: ConfigDescription) -> None:
@@ -274,17 +270,13 @@ class Client:
         if self.config_callback is not None:
             self.config_callback(deepcopy(config))
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def __repr__(self) -> str:
         return f"<Client of {self.name}>"
 
 
 def _decode(description: Description, message: ConfigMessage) -> Config:
-    known = {n: one for n, one in unpack_values(message).items() if n in description.settings}
-    values = description.defaults() | description.convert(known)
+    described = {
+        n: value for n, value in unpack_values(message).items() if n in description.settings
+    }
+    values = description.defaults() | description.convert(described)
     return description.config(values, unpack_states(message))

@@ -8,8 +8,6 @@ from typing import Any, Final
 from rosz.errors import YamlError
 from rosz.params import yaml
 
-__all__ = ("dump", "load")
-
 _ROS1_TAG: Final = "!!python/object/new:dynamic_reconfigure.encoding.Config"
 """Tag of each configuration in a file of dynparam, which is a pickled object."""
 
@@ -39,16 +37,16 @@ def load(text: str, path: str = "<string>") -> dict[str, Any]:
     """
     # Without its tag the value is a plain mapping; nothing is unpickled.
     is_pickled = _ROS1_TAG in text
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     for document in yaml.load_all(text.replace(_ROS1_TAG, ""), path):
         plain = _unwrap(document) if is_pickled else document
         if not isinstance(plain, dict):
             raise YamlError(f"{plain!r:.60}: expected a dictionary of names to values", path)
-        found |= plain
-    groups = found.get("groups")
+        settings |= plain
+    groups = settings.get("groups")
     if isinstance(groups, dict) and "state" in groups and "groups" in groups:
-        found["groups"] = _states(groups)
-    return found
+        settings["groups"] = _states(groups)
+    return settings
 
 
 def _states(tree: Mapping[str, Any]) -> dict[str, bool]:

@@ -23,29 +23,14 @@ from rosz.msgs.dynamic_reconfigure.msg import (
 )
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import Group as GroupMessage
-from rosz.reconfigure.description import Config, Description, Group
-from rosz.reconfigure.setting import BOUNDS, Scalar, Setting, kind_of
-
-__all__ = (
-    "DESCRIPTIONS",
-    "SET",
-    "UPDATES",
-    "decode_config",
-    "decode_description",
-    "describe",
-    "encode_config",
-    "encode_description",
-    "encode_groups",
-    "extract_params",
-    "get_tree",
-    "group_dict",
-    "in_groups",
-    "initial_config",
-    "pack_description",
-    "pack_values",
-    "unpack_description",
-    "unpack_states",
-    "unpack_values",
+from rosz.reconfigure.description import (
+    BOUNDS,
+    Config,
+    Description,
+    Group,
+    Scalar,
+    Setting,
+    kind_of,
 )
 
 DESCRIPTIONS: Final = "parameter_descriptions"
@@ -77,7 +62,7 @@ def pack_values(values: Mapping[str, Any]) -> ConfigMessage:
 def unpack_values(message: ConfigMessage) -> dict[str, Any]:
     """Return the values of a message: bools first, then ints, strs and doubles."""
     parts: tuple[Iterable[Any], ...] = (message.bools, message.ints, message.strs, message.doubles)
-    return {one.name: one.value for part in parts for one in part}
+    return {parameter.name: parameter.value for part in parts for parameter in part}
 
 
 def unpack_states(message: ConfigMessage) -> dict[int, bool]:
@@ -90,18 +75,22 @@ def pack_description(description: Description) -> ConfigDescription:
     settings = description.settings
     return ConfigDescription(
         groups=[_packed(group, parent) for group, parent in description.groups],
-        max=pack_values({name: one.max for name, one in settings.items()}),
-        min=pack_values({name: one.min for name, one in settings.items()}),
-        dflt=pack_values({name: one.default for name, one in settings.items()}),
+        max=pack_values({name: setting.max for name, setting in settings.items()}),
+        min=pack_values({name: setting.min for name, setting in settings.items()}),
+        dflt=pack_values({name: setting.default for name, setting in settings.items()}),
     )
 
 
 def _packed(group: Group, parent: int) -> GroupMessage:
     parameters = [
         ParamDescription(
-            one.name, one.kind or "", one.level & _LEVELS, one.description, one.edit_method
+            setting.name,
+            setting.kind or "",
+            setting.level & _LEVELS,
+            setting.description,
+            setting.edit_method,
         )
-        for one in group.settings
+        for setting in group.settings
     ]
     return GroupMessage(group.name, group.type, parameters, parent, group.id)
 
@@ -137,7 +126,7 @@ def describe(config_description: Mapping[str, Any]) -> Description:
 def _group_of(given: Mapping[str, Any]) -> Group:
     return Group(
         name=given["name"],
-        settings=tuple(_setting_of(one) for one in given["parameters"]),
+        settings=tuple(_setting_of(parameter) for parameter in given["parameters"]),
         groups=tuple(map(_group_of, _inner_groups(given))),
         type=given["type"],
         state=bool(given.get("state", True)),
@@ -153,11 +142,10 @@ def _setting_of(given: Mapping[str, Any]) -> Setting:
 
 def extract_params(group: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the parameters of a group, then those of the groups in it."""
-    return [one for inner in _groups_of(group) for one in inner["parameters"]]
+    return [parameter for inner in _groups_of(group) for parameter in inner["parameters"]]
 
 
 def _groups_of(group: Any) -> Iterator[Any]:
-    """Yield a group, then all groups in it."""
     yield group
     for inner in _inner_groups(group):
         yield from _groups_of(inner)
@@ -181,16 +169,19 @@ def encode_groups(
     """Return the messages of a group and of all groups in it; ``parent`` is ignored."""
     parameters = [
         ParamDescription(
-            one["name"],
-            one["type"],
-            one["level"] & _LEVELS,
-            one["description"],
-            one["edit_method"],
+            parameter["name"],
+            parameter["type"],
+            parameter["level"] & _LEVELS,
+            parameter["description"],
+            parameter["edit_method"],
         )
-        for one in group["parameters"]
+        for parameter in group["parameters"]
     ]
     message = GroupMessage(group["name"], group["type"], parameters, group["parent"], group["id"])
-    return [message, *(one for inner in group["groups"] for one in encode_groups(message, inner))]
+    return [
+        message,
+        *(below for inner in group["groups"] for below in encode_groups(message, inner)),
+    ]
 
 
 def encode_config(config: Mapping[str, Any], flat: bool = True) -> ConfigMessage:
@@ -200,12 +191,14 @@ def encode_config(config: Mapping[str, Any], flat: bool = True) -> ConfigMessage
         config: Values by name, and groups under ``groups``.
         flat: Whether the groups are a tree; otherwise they are a list.
     """
-    message = pack_values({name: one for name, one in config.items() if isinstance(one, Scalar)})
-    for one in config.values():
-        if isinstance(one, Mapping) and flat:
-            message.groups += [_state(one), *_inner_states(one)]
-        elif isinstance(one, list | Mapping):
-            message.groups = [_state(group) for group in one]
+    message = pack_values(
+        {name: value for name, value in config.items() if isinstance(value, Scalar)}
+    )
+    for value in config.values():
+        if isinstance(value, Mapping) and flat:
+            message.groups += [_state(value), *_inner_states(value)]
+        elif isinstance(value, list | Mapping):
+            message.groups = [_state(group) for group in value]
     return message
 
 
@@ -244,14 +237,14 @@ def decode_description(msg: ConfigDescription) -> Config:
     for group in _groups_of(root):
         group["parameters"] = [
             {
-                "name": one.name,
-                **{key: values[one.name] for key, values in bounds.items()},
-                "type": one.type,
-                "level": one.level,
-                "description": one.description,
-                "edit_method": one.edit_method,
+                "name": parameter.name,
+                **{key: values[parameter.name] for key, values in bounds.items()},
+                "type": parameter.type,
+                "level": parameter.level,
+                "description": parameter.description,
+                "edit_method": parameter.edit_method,
             }
-            for one in messages[group["id"]].parameters
+            for parameter in messages[group["id"]].parameters
         ]
     return root
 
@@ -266,12 +259,12 @@ def get_tree(m: Any, group: Any = None) -> Config:
     Returns:
         The root, or the groups in ``group`` by name.
     """
-    root = group if group is not None else next(one for one in m.groups if one.id == _ROOT)
+    root = group if group is not None else next(member for member in m.groups if member.id == _ROOT)
     inside = Config()
-    for one in m.groups:
-        if one.id != _ROOT and one.parent == root.id:
-            inside[one.name] = group_dict(one)
-            inside[one.name]["groups"] = get_tree(m, one)
+    for member in m.groups:
+        if member.id != _ROOT and member.parent == root.id:
+            inside[member.name] = group_dict(member)
+            inside[member.name]["groups"] = get_tree(m, member)
     if root.id != _ROOT:
         return inside
     tree = group_dict(root)
@@ -287,11 +280,11 @@ def initial_config(msg: ConfigMessage, description: Mapping[str, Any] | None = N
         description: Root group of a generated module; without it, groups are left out.
     """
     config = Config(unpack_values(msg))
-    for group, known in _decode_groups(config, msg, description):
+    for group, described in _decode_groups(config, msg, description):
         if group["id"] != _ROOT:
-            group["state"] = known["state"]
-        for one in known["parameters"]:
-            group["parameters"][one["name"]] = config[one["name"]]
+            group["state"] = described["state"]
+        for parameter in described["parameters"]:
+            group["parameters"][parameter["name"]] = config[parameter["name"]]
     return config
 
 
@@ -304,10 +297,10 @@ def decode_config(msg: ConfigMessage, description: Mapping[str, Any] | None = No
             out. With it, each group holds its parameters.
     """
     config = Config(unpack_values(msg))
-    for group, known in _decode_groups(config, msg, description):
-        for one in known["parameters"]:
-            if one["name"] in config:
-                group[one["name"]] = config[one["name"]]
+    for group, described in _decode_groups(config, msg, description):
+        for parameter in described["parameters"]:
+            if parameter["name"] in config:
+                group[parameter["name"]] = config[parameter["name"]]
     return config
 
 

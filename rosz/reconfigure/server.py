@@ -5,9 +5,10 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final
 
 from rosz.errors import ParamError
+from rosz.lifecycle import Closing
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import ConfigDescription
 from rosz.msgs.dynamic_reconfigure.srv import Reconfigure
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.params.replica import Changed
 
-__all__ = ("ALL_LEVELS", "Server")
-
 ALL_LEVELS: Final = ~0
 """The level that a callback is called with the first time: every bit is set."""
 
@@ -35,7 +34,7 @@ Callback = Callable[[Config, int], Mapping[str, Any] | None]
 _UNSET: Final = object()
 
 
-class Server:
+class Server(Closing):
     """Lets others change the settings of a node while it runs.
 
     The first values are those in the parameter store, or defaults. All values are written to the
@@ -44,8 +43,6 @@ class Server:
     ``parameter_updates`` and ``set_parameters``.
 
     Attributes:
-        node: Node that has the settings.
-        description: Description of the settings.
         callback: Function called before a change; may be replaced.
         name: Namespace of the server, which is its name for clients.
 
@@ -134,8 +131,10 @@ class Server:
         with self._lock:
             new = self._values | self.description.clamp(values)
             level = self.description.level(self._values, new)
-            known = {number: shown for number, shown in states.items() if number in self._states}
-            self._apply(new, self._states | known, level)
+            shown_groups = {
+                number: shown for number, shown in states.items() if number in self._states
+            }
+            self._apply(new, self._states | shown_groups, level)
             return self.config
 
     def _apply(self, values: dict[str, Any], states: dict[int, bool], level: int) -> None:
@@ -148,8 +147,10 @@ class Server:
                 chosen = self.callback(config, level)
             if chosen is None:
                 chosen = config
-            known = {name: one for name, one in chosen.items() if name in description.settings}
-            self._values = values | description.convert(known)
+            described = {
+                name: value for name, value in chosen.items() if name in description.settings
+            }
+            self._values = values | description.convert(described)
             if "groups" in chosen:
                 self._states = states | description.read_states(chosen["groups"])
             self._store()
@@ -163,7 +164,7 @@ class Server:
 
     def _stored(self) -> dict[str, Any]:
         """Return the values in the parameter store that can be converted for their settings."""
-        found: dict[str, Any] = {}
+        converted: dict[str, Any] = {}
         params = self.node.params
         for name, setting in self.description.settings.items():
             full = f"{self.name}/{name}"
@@ -171,12 +172,12 @@ class Server:
             if value is _UNSET:
                 continue
             try:
-                found[name] = setting.convert(value)
+                converted[name] = setting.convert(value)
             except ParamError as error:
                 self.node.log.warning(
                     "ignoring parameter '%s', set by %s: %s", full, params.origin(full), error
                 )
-        return found
+        return converted
 
     def _store(self) -> None:
         """Write the values that differ from those in the store, as one change."""
@@ -196,12 +197,6 @@ class Server:
             differing = {n: value for n, value in stored.items() if value != self._values[n]}
             if differing:
                 self._change(differing, {})
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         return f"<Server {self.name} of {', '.join(self.description.settings)}>"

@@ -14,12 +14,9 @@ from rosz.ros1.importer import install
 
 PUBLIC_MODULES = (
     "__main__",
-    "container",
-    "importer",
     "modules",
     "python2",
     "python_setup",
-    "rosservice",
 )
 
 __all__ = ("install",)

@@ -1,6 +1,7 @@
 """``python -m rosz.ros1 SCRIPT [ARGUMENTS]``: run a Python script with ROS 1's names importable.
 
 A name of a command of ROS 1, such as ``rosparam``, runs that command of rosz, unless it is a file.
+``--container`` in place of a script runs several; see `rosz.ros1.container`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,10 @@ def main(argv: Sequence[str], begin: Callable[[], object] | None = None) -> None
         argv: Arguments without the program name.
         begin: Function to call right before the script runs.
     """
+    if argv and argv[0] == "--container":
+        from rosz.ros1.container import main as run_several
+
+        sys.exit(run_several(argv[1:], begin))
     from rosz.ros1.importer import install
     from rosz.ros1.script import Script
 

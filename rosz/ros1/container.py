@@ -5,8 +5,8 @@ graph, the parameters and the link to others. Each has a thread of its own, on w
 as ``__main__`` with its own ``sys.argv``, and its own node of rospy or context of rclpy.
 
 A program that ends leaves the others alone, unless it is required. One that is to be respawned runs
-again in the same process: what it declared is closed by then. Modules that it imported stay loaded,
-and threads that it left behind go on with a node that is shut down.
+again in the same process: its publishers and other entities are closed by then. Its modules stay
+loaded, and threads that it left behind go on with a node that is shut down.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from rosz.ros1.importer import install
 from rosz.ros1.script import Script
 from rosz.ros1.state import separate_states
 
-__all__ = ("Container", "main")
-
 _BY_REFERENCE = "--by-reference"
 _NODE = "--node"
 _SLICE = 0.5
 """Seconds between two looks at the shutdown, so that Python notices signals."""
+# As in a launch: a script that fails at once must not keep the processor busy.
 _MIN_RESPAWN = 0.1
+# With the two times below, less than the 15 seconds after which a launch sends SIGTERM.
 _HOOKS_TIMEOUT = 10.0
 _RETURN_TIMEOUT = 1.0
 """Seconds that programs have to return after the shutdown, before they are interrupted."""
@@ -78,7 +78,8 @@ class Container:
         separate_programs()
         separate_states()
         install()
-        _import_siblings()
+        # Each program imports modules beside its script before those on sys.path.
+        sys.meta_path.insert(sys.meta_path.index(PathFinder), _Siblings())
         self._context = Context()
         self._context.local_delivery = LocalDelivery(by_reference=by_reference)
         self._context.cooperative = True
@@ -241,11 +242,7 @@ class Container:
 
 
 class _WholeLines(io.TextIOBase):
-    """A text stream that keeps the lines of several threads apart.
-
-    Args:
-        stream: The stream that it writes to, one line at a time.
-    """
+    """A text stream that keeps the lines of several threads apart."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -261,7 +258,7 @@ class _WholeLines(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Write what this thread has not completed."""
+        """Write the line that this thread has not completed."""
         waiting, self._local.text = getattr(self._local, "text", ""), ""
         if waiting:
             self._stream.write(waiting)
@@ -271,11 +268,9 @@ class _WholeLines(io.TextIOBase):
         return getattr(self._stream, name)
 
     def isatty(self) -> bool:
-        """Return whether the stream is a terminal."""
         return self._stream.isatty()
 
     def fileno(self) -> int:
-        """Return the descriptor of the stream."""
         return self._stream.fileno()
 
 
@@ -311,28 +306,17 @@ class _Siblings(MetaPathFinder):
         path: Sequence[str] | None = None,
         target: ModuleType | None = None,  # noqa: ARG002  # the signature of a finder
     ) -> ModuleSpec | None:
-        """Return how to load a module of the script's folder."""
         program = current()
         if program is None or path is not None or not program.folder:
             return None
         return PathFinder.find_spec(fullname, [program.folder])
 
 
-def _import_siblings() -> None:
-    """Let each program import what lies beside its script before what is on ``sys.path``."""
-    index = sys.meta_path.index(PathFinder)
-    sys.meta_path.insert(index, _Siblings())
-
-
 def _builtins(own: str, folders: Mapping[str, str]) -> dict[str, Any]:
     """Return builtins for a script whose ``import`` refuses modules of other scripts' folders.
 
     Modules are shared by all programs, so two scripts with different modules of one name beside
-    them cannot both have theirs.
-
-    Args:
-        own: Folder of the script.
-        folders: Folders of all scripts, with the name of a program of each.
+    them cannot both have theirs. The folders of all scripts have the name of a program of each.
     """
     beside = {path.stem for path in Path(own).iterdir() if path.suffix in {"", ".py"}}
 
@@ -353,7 +337,7 @@ def _builtins(own: str, folders: Mapping[str, str]) -> dict[str, Any]:
     return {**vars(builtins), "__import__": import_module}
 
 
-def main(argv: Sequence[str], begin: Callable[[], object]) -> int:
+def main(argv: Sequence[str], begin: Callable[[], object] | None) -> int:
     """Run a container.
 
     Args:
@@ -366,7 +350,8 @@ def main(argv: Sequence[str], begin: Callable[[], object]) -> int:
     words = [word for word in argv if word not in {_BY_REFERENCE, _NODE}]
     try:
         name, *texts = words
-        begin()
+        if begin is not None:
+            begin()
         specs = [msgspec.json.decode(text, type=ProgramSpec) for text in texts]
         container = Container(name, specs, by_reference=_BY_REFERENCE in argv, node=_NODE in argv)
     except (ValueError, msgspec.MsgspecError) as error:

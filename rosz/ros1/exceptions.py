@@ -1,10 +1,13 @@
 """The exceptions of rospy; programs import them as ``rospy.exceptions``.
 
-They do not lie in ``rosz.ros1.rospy``, since what rospy is built on raises them too (ROS wiki,
-rospy/Overview/Exceptions).
+They do not lie in ``rosz.ros1.client.rospy``, since the modules below rospy raise them too (ROS
+wiki, rospy/Overview/Exceptions).
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 __all__ = (
     "ROSException",
@@ -66,3 +69,12 @@ class TransportInitError(TransportException):
 for _name in __all__:
     # Tracebacks and pickles use the name that programs import.
     globals()[_name].__module__ = "rospy.exceptions"
+
+
+@contextmanager
+def raised_as(kind: type[Exception], foreign: type[Exception]) -> Iterator[None]:
+    """Raise errors of one class as those of another, with the same text."""
+    try:
+        yield
+    except foreign as error:
+        raise kind(str(error)) from error

@@ -1,57 +1,75 @@
 """Makes ROS 1's Python modules and message packages importable.
 
-It adds two finders to ``sys.meta_path``. The first one stands in front and finds what rosz ships
+It adds two finders to ``sys.meta_path``. The first one stands in front and finds rosz's own modules
 (``std_msgs``, ``rospy``, …), and ``<package>.msg``, ``<package>.srv`` and ``<package>.cfg`` of any
 package on the package path. The second one stands at the end and finds packages that nothing else
 provides; only it searches the package path for a plain name. It finds the Python modules that
 packages offer (`python_setup`), with their messages in them as in catkin's devel space.
 
 A module of rosz is the same object as rosz's own: ``std_msgs.msg`` is ``rosz.msgs.std_msgs.msg``.
+
+As with genpy, ``from <package>.msg import *`` binds more than the types. Each module that genpy
+generates imports ``genpy``, ``struct``, ``sys``, ``codecs`` and the packages of the types in a
+definition, and has no ``__all__``. Programs have come to use these names without an import of their
+own: ``sys.argv``, ``geometry_msgs.msg.Point()``.
 """
 
 from __future__ import annotations
 
+import builtins
+import codecs
 import copy  # noqa: F401  # tries to import Jython's "org", which must not be searched for
+import struct
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from importlib.util import find_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rosz.environment import Environment, package_index
 from rosz.errors import PackageError, RoszError
-from rosz.message import Ros2Default
+from rosz.interrupts import InterruptDeferral
+from rosz.message import Message, Ros2Default, Service
 from rosz.packages import PackageIndex
 from rosz.replacements import instead_of
-from rosz.ros1 import derived
 from rosz.ros1.modules import (
-    ELSEWHERE,
-    EXTRAS,
-    LAST,
     MODULES,
-    SUBMODULES,
+    Module,
     add_submodules,
     attribute,
     explain_missing,
     submodule,
 )
-from rosz.ros1.star_import import add_names
 from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
 
 if TYPE_CHECKING:
     from rosz.ros1.python_setup import Offers
 
-__all__ = ("install", "package_path", "type_store", "uninstall")
-
 _KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv", "action": "action"}
 _CFG = "cfg"
 _RCLPY = "rclpy"
+_plain_build = builtins.__build_class__
+
+
+# Programs derive classes from messages, as in ``class Wrapper(DiagnosticStatus)``. Such a statement
+# takes the metaclass of its bases, and that of messages refuses ``__init__``. Nothing less helps:
+# ``__init_subclass__`` is called after the refusal. A metaclass of messages that does not refuse,
+# even without a ``__call__``, triples the time that they take to make with keywords in Python 3.11,
+# where a class made by Python code does not inherit the vectorcall of its base. A ``__builtins__``
+# of their own for the modules that rosz loads would miss those that Python finds on ``sys.path``.
+def _build_class(body: Any, name: str, /, *bases: Any, **options: Any) -> Any:
+    """Run a class statement; one that derives from messages gets a metaclass for that."""
+    if "metaclass" not in options and any(getattr(base, "_schema", None) for base in bases):
+        from rosz.message import Derived
+
+        options["metaclass"] = Derived
+    return _plain_build(body, name, *bases, **options)
 
 
 def install(store: TypeStore | None = None, packages: PackageIndex | None = None) -> None:
@@ -63,7 +81,7 @@ def install(store: TypeStore | None = None, packages: PackageIndex | None = None
     """
     if any(isinstance(finder, _FrontFinder) for finder in sys.meta_path):
         return
-    derived.install()
+    builtins.__build_class__ = _build_class
     types = _Types(store, packages)
     sys.meta_path.insert(0, _FrontFinder(types))
     sys.meta_path.append(_EndFinder(types))
@@ -72,20 +90,23 @@ def install(store: TypeStore | None = None, packages: PackageIndex | None = None
 def uninstall() -> None:
     """Remove the finders; modules that are imported stay."""
     sys.meta_path[:] = [
-        one for one in sys.meta_path if not isinstance(one, _FrontFinder | _EndFinder)
+        finder for finder in sys.meta_path if not isinstance(finder, _FrontFinder | _EndFinder)
     ]
 
 
 def type_store() -> TypeStore:
     """Return the store of the message classes that imports return."""
-    install()
-    return next(one.types.store for one in sys.meta_path if isinstance(one, _FrontFinder))
+    return _types().store
 
 
 def package_path() -> PackageIndex:
     """Return the packages that imports search."""
+    return _types().packages
+
+
+def _types() -> _Types:
     install()
-    return next(one.types.packages for one in sys.meta_path if isinstance(one, _FrontFinder))
+    return next(finder.types for finder in sys.meta_path if isinstance(finder, _FrontFinder))
 
 
 class _Types:
@@ -115,7 +136,6 @@ class _Types:
 
     @cached_property
     def offers(self) -> Offers:
-        """The Python modules of packages."""
         from rosz.ros1.python_setup import Offers
 
         return Offers(self.packages, self._cache / "modules.json")
@@ -139,8 +159,7 @@ class _Types:
         return module
 
     def cfg_files(self, package: str) -> list[Path]:
-        """Return the dynamic_reconfigure files of a package."""
-        from rosz.ros1.dynamic_reconfigure import find_files
+        from rosz.ros1.client.dynamic_reconfigure import find_files
 
         try:
             return find_files(self.packages.find(package).path)
@@ -150,8 +169,10 @@ class _Types:
     def folder(self, package: str) -> Path | None:
         """Return the folder of a package that has types or dynamic_reconfigure files."""
         try:
-            known = any(self.store.has(package, kind) for kind in _KINDS.values())
-            return self.packages.find(package).path if known or self.cfg_files(package) else None
+            has_types = any(self.store.has(package, kind) for kind in _KINDS.values())
+            return (
+                self.packages.find(package).path if has_types or self.cfg_files(package) else None
+            )
         except RoszError:  # a broken package must not break other imports
             return None
 
@@ -165,8 +186,8 @@ class _AliasLoader(Loader):
         self._spec: ModuleSpec | None = None
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return the module."""
-        module = self._load()
+        with InterruptDeferral():
+            module = self._load()
         self._name, self._spec = spec.name, module.__spec__
         return module
 
@@ -181,15 +202,12 @@ def _alias(name: str, load: Callable[[], ModuleType]) -> ModuleSpec:
 
 
 def _loaded(name: str, load: Callable[[], ModuleType]) -> ModuleType:
-    """Load a module of rosz.
-
-    Raises:
-        ModuleNotFoundError: It needs an extra, which the text names.
-    """
+    """Load a module of rosz; if it needs an extra, the error names that."""
     try:
         module = load()
     except ModuleNotFoundError as error:
-        extra = EXTRAS.get(name.partition(".")[0], {}).get(error.name or "")
+        module_of = MODULES.get(name.partition(".")[0], Module())
+        extra = module_of.extras.get(error.name or "")
         if extra is None:
             raise
         text = f"{error}; {name} needs it, run: pip install 'rosz[{extra}]'"
@@ -202,7 +220,6 @@ class _FrontFinder(MetaPathFinder):
     def __init__(self, types: _Types) -> None:
         self.types = types
         self._shipped = shipped_packages()
-        self._modules = frozenset((*MODULES, *ELSEWHERE))
 
     def find_spec(
         self,
@@ -215,25 +232,26 @@ class _FrontFinder(MetaPathFinder):
         if root == "rosz":
             # ``from sensor_msgs import point_cloud2`` looks below the module's own name.
             alias = fullname.removeprefix("rosz.msgs.")
-            return self._of_rosz(alias, alias) if alias in ELSEWHERE else self._compiled(fullname)
-        found = self._of_ros(fullname, root, rest, path)
-        if found is not None:
+            if "." in alias and MODULES.get(alias, Module()).home:
+                return self._of_rosz(alias, alias)
+            return self._compiled(fullname)
+        spec = self._of_ros(fullname, root, rest, path)
+        if spec is not None:
             Ros2Default.ros1 = root != _RCLPY and _RCLPY not in sys.modules
-        return found
+        return spec
 
     def _of_ros(
         self, fullname: str, root: str, rest: str, path: Sequence[str] | None
     ) -> ModuleSpec | None:
-        """Find a module by its name in ROS."""
         first, _, inner = rest.partition(".")
-        kind = _KINDS.get(first) if fullname not in SUBMODULES else None
+        kind = _KINDS.get(first) if fullname not in MODULES else None
         if kind == "action" and not self.types.store.has(root, kind):
             kind = None  # such as rclpy.action
         if kind is not None:
             return self._of_package(fullname, root, kind, inner, path)
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
-        if root in self._modules or fullname in self._modules:
+        if root in MODULES or fullname in MODULES:
             return self._of_rosz(fullname, root)
         if root in self._shipped and not rest:
             return _alias(fullname, lambda: self._of_messages(root))
@@ -253,15 +271,16 @@ class _FrontFinder(MetaPathFinder):
 
     def _of_rosz(self, name: str, root: str) -> ModuleSpec | None:
         """Find ``rospy`` or one of its submodules; importing it may need an extra."""
-        if name in SUBMODULES:
+        module = MODULES.get(name)
+        if module is not None and not module.home:
             return _alias(name, lambda: _loaded(name, lambda: submodule(name)))
-        below = ELSEWHERE.get(root, f"ros1.{root}") + name.removeprefix(root)
-        own = f"rosz.{ELSEWHERE.get(name, below)}"
+        below = module.home if module else MODULES[root].home + name.removeprefix(root)
+        own = f"rosz.{below}"
         try:
-            known = own in sys.modules or find_spec(own) is not None
+            exists = own in sys.modules or find_spec(own) is not None
         except ModuleNotFoundError:  # a plain module has no submodules
-            known = False
-        return _alias(name, lambda: _loaded(name, lambda: import_module(own))) if known else None
+            exists = False
+        return _alias(name, lambda: _loaded(name, lambda: import_module(own))) if exists else None
 
     def _compiled(self, name: str) -> ModuleSpec | None:
         """Find ``rosz.msgs.<package>`` of a package that is compiled, for pickle."""
@@ -299,7 +318,7 @@ class _FrontFinder(MetaPathFinder):
         shipped = package in self._shipped
         types = self.types
         module = types.shipped(package, kind) if shipped else types.store.module(package, kind)
-        return module if kind == "action" else add_names(module)
+        return module if kind == "action" else _add_names(module)
 
     def _of_cfg(
         self, name: str, package: str, inner: str, path: Sequence[str] | None
@@ -309,7 +328,7 @@ class _FrontFinder(MetaPathFinder):
         if not files:
             return None
         if inner:
-            from rosz.ros1.dynamic_reconfigure.cfgfile import load
+            from rosz.ros1.client.dynamic_reconfigure.cfgfile import load
 
             return _alias(name, lambda: load(name, files)) if inner.endswith("Config") else None
         generated = PathFinder.find_spec(name, path)
@@ -334,22 +353,22 @@ class _EndFinder(MetaPathFinder):
         """Find a module of a package on the package path.
 
         Raises:
-            ModuleNotFoundError: ROS has such a module and rosz has not; the text says what to use.
+            ModuleNotFoundError: ROS has such a module and rosz has not; it names a replacement.
         """
         root, _, rest = fullname.partition(".")
         # Python's library tries modules of other systems while modules that are needed here load.
         if root in sys.stdlib_module_names:
             return None
-        found = None
+        spec = None
         if path is None and not rest:
-            found = self._of_package(fullname)
+            spec = self._of_package(fullname)
         elif root in self._shipped and "." not in rest:
             code = self._types.offers.find(root)
-            found = PathFinder.find_spec(fullname, [str(code)]) if code is not None else None
-        if found is not None:
-            return found
-        if fullname in LAST:
-            return _alias(fullname, lambda: import_module(f"rosz.ros1.{fullname}"))
+            spec = PathFinder.find_spec(fullname, [str(code)]) if code is not None else None
+        if spec is not None:
+            return spec
+        if fullname == "ros":  # a file or a package of the user's with this name hides it
+            return _alias(fullname, _all_modules)
         instead = instead_of(fullname)
         if instead:
             text = f"No module named '{fullname}': rosz does not have it: {instead}"
@@ -357,7 +376,7 @@ class _EndFinder(MetaPathFinder):
         return None
 
     def _of_package(self, name: str) -> ModuleSpec | None:
-        """Find what a package offers: its Python code, its types, or both."""
+        """Find the Python code of a package, its types, or both."""
         code = self._types.offers.find(name)
         types = self._types.folder(name)
         if code is not None:
@@ -385,12 +404,28 @@ class _CodeLoader(SourceFileLoader):
     """
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run the module."""
         file = Path(self.path)
         folder = str((file.parent if file.name == "__init__.py" else file).parent)
         if folder not in sys.path:
             sys.path.insert(0, folder)
         super().exec_module(module)
+
+
+def _all_modules() -> ModuleType:
+    """Return ``ros``, in which roslib has other modules: ``from ros import rospy``."""
+
+    def find(name: str) -> ModuleType:
+        try:
+            return import_module(name)
+        except ModuleNotFoundError as error:
+            if error.name != name:
+                raise
+            text = f"module 'ros' has no attribute '{name}': {error}"
+            raise AttributeError(text, name=name) from error
+
+    module = ModuleType("ros")
+    vars(module)["__getattr__"] = find
+    return module
 
 
 def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:
@@ -400,3 +435,57 @@ def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:
         if hasattr(module, each):
             setattr(single, each, getattr(module, each))
     return single
+
+
+_PLAIN = {"codecs": codecs, "python3": True, "struct": struct, "sys": sys}
+
+
+class _Genpy(ModuleType):
+    """genpy, imported at its first use, since it takes longer than the messages."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(import_module("genpy"), name)
+
+
+def _add_names(module: ModuleType) -> ModuleType:
+    """Add genpy's names to a module of messages or services, and return it; again does nothing.
+
+    Packages are imported when they are asked for.
+    """
+    names = vars(module)
+    types = names.get("__all__", ())
+    if "python3" in types:
+        return module
+    for name, value in _PLAIN.items():
+        names.setdefault(name, value)
+    packages = {package for each in types if each in names for package in _packages_in(names[each])}
+    before = names.get("__getattr__")
+
+    def find(name: str) -> Any:
+        if name == "genpy":
+            return sys.modules.get(name) or _Genpy(name)
+        if name in packages:
+            return import_module(f"{name}.msg") and sys.modules[name]
+        if before is None:
+            raise AttributeError(f"module '{module.__name__}' has no attribute '{name}'")
+        return before(name)
+
+    names["__getattr__"] = find
+    names["__all__"] = tuple(sorted({*types, *_PLAIN, *packages, "genpy"}))
+    return module
+
+
+def _packages_in(kind: Any) -> Iterator[str]:
+    """Yield the packages of the messages in a type, at any depth."""
+    parts = (kind.Request, kind.Response) if issubclass(kind, Service) else (kind,)
+    for part in parts:
+        yield from _below(part)
+
+
+@cache
+def _below(cls: Any) -> frozenset[str]:
+    packages: set[str] = set()
+    for _, kind, _ in cls._schema:
+        if isinstance(kind, type) and issubclass(kind, Message):
+            packages |= {kind._type.partition("/")[0], *_below(kind)}
+    return frozenset(packages - {"builtin_interfaces"})  # time and duration have no package

@@ -6,8 +6,6 @@ import re
 
 from rosz.errors import SourceError
 
-__all__ = ("explain", "hint")
-
 _CONVERT = "convert the file with: 2to3 -w {path} (or futurize -w {path})"
 
 # Errors of Python 3's parser and the Python 2 syntax that causes them. For "invalid syntax" the

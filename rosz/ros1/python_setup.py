@@ -1,7 +1,7 @@
 """The Python modules that packages offer to others, as their setup.py says.
 
-What was read of a setup.py (`setup_reader`) is kept in a file, and read again when the setup.py has
-changed. The importer looks for modules here, so little is imported before it is needed.
+A file keeps the modules of each setup.py (`setup_reader`), which is read again when it has changed.
+The importer looks for modules here, so little is imported before it is needed.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from pathlib import Path
 import msgspec
 
 from rosz.packages import PackageIndex
-
-__all__ = ("Offered", "Offers", "is_module")
 
 _SETUP = "setup.py"
 
@@ -47,20 +45,21 @@ class Offers:
 
     Args:
         index: The packages.
-        memory: File that keeps what was read; None to read it in each process.
+        memory: File that keeps the modules.
     """
 
-    def __init__(self, index: PackageIndex, memory: Path | None = None) -> None:
+    def __init__(self, index: PackageIndex, memory: Path) -> None:
         self._index = index
         self._memory = memory
 
     def find(self, name: str) -> Path | None:
         """Return the folder or file of a module by its name without dots, or None."""
-        known = self._modules.get(name)
-        if known is not None and is_module(known):
-            return known
+        module = self._modules.get(name)
+        if module is not None and is_module(module):
+            return module
         for folder, excluded in self._folders:
-            if is_module(folder / name) and not any(fnmatchcase(name, one) for one in excluded):
+            hidden = any(fnmatchcase(name, pattern) for pattern in excluded)
+            if is_module(folder / name) and not hidden:
                 return folder / name
         # Also without a setup.py: catkin's users put the code of a package there.
         package = self._paths.get(name)
@@ -99,9 +98,8 @@ class Offers:
 
     @cached_property
     def _offered(self) -> dict[str, Offered]:
-        """The modules that each package offers, by its name."""
         kept = self._kept()
-        found: dict[str, Offered] = {}
+        modules: dict[str, Offered] = {}
         fresh: dict[str, _Read] = {}
         for name, folder in self._paths.items():
             file = folder / _SETUP
@@ -116,14 +114,12 @@ class Offers:
                 offered = Offered(*read_setup(folder))
                 read = _Read(state.st_mtime_ns, state.st_size, offered)
                 fresh[str(file)] = read
-            found[name] = read.offered
+            modules[name] = read.offered
         if fresh:
             self._keep(kept | fresh)
-        return found
+        return modules
 
     def _kept(self) -> dict[str, _Read]:
-        if self._memory is None:
-            return {}
         try:
             return msgspec.json.decode(self._memory.read_bytes(), type=dict[str, _Read])
         except (OSError, msgspec.DecodeError):  # there is none yet, or one of another release
@@ -131,9 +127,7 @@ class Offers:
 
     def _keep(self, read: dict[str, _Read]) -> None:
         """Write the file atomically, since other processes may write it too."""
-        if self._memory is None:
-            return
-        present = {path: one for path, one in read.items() if Path(path).exists()}
+        present = {path: entry for path, entry in read.items() if Path(path).exists()}
         from tempfile import NamedTemporaryFile
 
         with suppress(OSError):  # a read-only home: each process reads for itself

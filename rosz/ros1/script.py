@@ -18,8 +18,6 @@ from types import CodeType, ModuleType, TracebackType
 from rosz.errors import NotFoundError, RoszError
 from rosz.ros1.python2 import explain, hint
 
-__all__ = ("Script",)
-
 _Hook = Callable[[type[BaseException], BaseException, TracebackType | None], object]
 
 

@@ -1,4 +1,4 @@
-"""Runs a setup.py and prints what it tells ``setup()`` of its modules, as JSON.
+"""Runs a setup.py and prints the arguments of ``setup()`` about its modules, as JSON.
 
 ``python -I setup_probe.py FOLDER`` is run in a process of its own, without rosz. Nothing is built:
 ``setup()`` only records its arguments, and catkin_pkg and a missing setuptools are stood in for.
@@ -17,8 +17,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 from unittest.mock import MagicMock
-
-__all__ = ("main",)
 
 _WANTED = ("packages", "package_dir", "py_modules")
 _DEFAULTS = {"name": "package", "version": "0.0.0"}
@@ -50,7 +48,7 @@ def main(folder: str) -> None:
 
 
 def _module(name: str) -> ModuleType:
-    """Return a module for building packages, or what takes its place where it is missing."""
+    """Return a module for building packages, or a replacement where it is missing."""
     with suppress(ImportError):
         return import_module(name)
     for parent in (name.partition(".")[0], name):

@@ -1,4 +1,4 @@
-"""Reads what a setup.py says of the Python modules of a package.
+"""Finds the Python modules of a package by its setup.py.
 
 catkin runs each setup.py when it builds a workspace. Nothing is built here: a setup.py is read
 without running it where its values are plain, and runs in a process of its own where they are not.
@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import msgspec
-
-__all__ = ("read_setup",)
 
 _SETUP = "setup.py"
 _PROBE = Path(__file__).with_name("setup_probe.py")
@@ -51,7 +49,7 @@ def read_setup(folder: Path) -> tuple[dict[str, str], _Folders]:
     return _locate(folder, told, reader.found)
 
 
-def _locate(folder: Path, told: dict[str, Any], found: _Folders) -> tuple[dict[str, str], _Folders]:
+def _locate(folder: Path, told: dict[str, Any], whole: _Folders) -> tuple[dict[str, str], _Folders]:
     """Return where modules are, by the rules of distutils."""
     places = {str(key): str(value) for key, value in (told.get("package_dir") or {}).items()}
     top = folder / places.get("", ".")
@@ -64,11 +62,11 @@ def _locate(folder: Path, told: dict[str, Any], found: _Folders) -> tuple[dict[s
     modules = {name: str(path_of(name)) for name in packages}
     for name, dot, _ in files:
         modules.setdefault(name, str(top / name) if dot else f"{top / name}.py")
-    return modules, [(str(folder / where), excluded) for where, excluded in found]
+    return modules, [(str(folder / where), excluded) for where, excluded in whole]
 
 
 def _run(folder: Path) -> dict[str, Any]:
-    """Return what a setup.py tells ``setup()`` when it runs, if catkin would run it."""
+    """Run a setup.py, if catkin would, and return the arguments of ``setup()``."""
     cmake = folder / "CMakeLists.txt"
     if cmake.is_file() and not _BUILT.search(cmake.read_text("utf-8", "replace")):
         return {}
@@ -99,7 +97,7 @@ class _Reader:
         self.found: _Folders = []
 
     def read(self, tree: ast.Module) -> dict[str, Any]:
-        """Return the arguments that tell of modules.
+        """Return the arguments about modules.
 
         Raises:
             _NotPlainError: The file has to be run.
@@ -107,16 +105,26 @@ class _Reader:
         for statement in tree.body:
             match statement:
                 case ast.Assign(targets=[ast.Name(id=name)], value=value):
-                    self._assign(name, value)
+                    self._names.pop(name, None)
+                    with suppress(_NotPlainError):
+                        self._names[name] = self._value(value)
                 case ast.Assign(
                     targets=[ast.Subscript(ast.Name(name), ast.Constant(key))], value=value
                 ) if isinstance(self._names.get(name), dict):
-                    self._assign_key(name, key, value)
+                    try:
+                        self._names[name][key] = self._value(value)
+                    except _NotPlainError:
+                        if key in _WANTED:
+                            del self._names[name]
                 case ast.Expr(value=ast.Call() as call) if _called(call) == "setup":
                     return self._arguments(call)
-                case ast.Import() | ast.ImportFrom() | ast.FunctionDef() | ast.ClassDef():
-                    pass
-                case ast.Expr(value=ast.Constant()):
+                case (
+                    ast.Import()
+                    | ast.ImportFrom()
+                    | ast.FunctionDef()
+                    | ast.ClassDef()
+                    | ast.Expr(value=ast.Constant())
+                ):
                     pass
                 case _:
                     self._forget(statement)
@@ -129,18 +137,6 @@ class _Reader:
                 self._names.pop(node.id, None)
             elif isinstance(node, ast.Call) and _called(node) == "setup":
                 raise _NotPlainError
-
-    def _assign(self, name: str, value: ast.expr) -> None:
-        self._names.pop(name, None)
-        with suppress(_NotPlainError):
-            self._names[name] = self._value(value)
-
-    def _assign_key(self, name: str, key: object, value: ast.expr) -> None:
-        try:
-            self._names[name][key] = self._value(value)
-        except _NotPlainError:
-            if key in _WANTED:
-                del self._names[name]
 
     def _arguments(self, call: ast.Call) -> dict[str, Any]:
         """Return the wanted ones of the named arguments of a call."""
@@ -166,14 +162,11 @@ class _Reader:
             case ast.Dict(keys=keys, values=values):
                 return self._dict(keys, values)
             case ast.BinOp(left=left, op=ast.Add(), right=right):
-                return self._sum(self._value(left), self._value(right))
+                first, second = self._value(left), self._value(right)
+                if type(first) is type(second) and isinstance(first, str | list):
+                    return first + second
             case ast.Call():
                 return self._call(node)
-        raise _NotPlainError
-
-    def _sum(self, first: Any, second: Any) -> Any:
-        if type(first) is type(second) and isinstance(first, str | list):
-            return first + second
         raise _NotPlainError
 
     def _call(self, call: ast.Call) -> Any:
@@ -186,17 +179,17 @@ class _Reader:
 
     def _dict(self, keys: list[ast.expr | None], values: list[ast.expr]) -> dict[str, Any]:
         """Return a dict without the values that are not plain and not needed."""
-        found: dict[str, Any] = {}
+        plain: dict[str, Any] = {}
         for key, value in zip(keys, values, strict=True):
             if key is None:
                 raise _NotPlainError
             name = self._value(key)
             try:
-                found[name] = self._value(value)
+                plain[name] = self._value(value)
             except _NotPlainError:
                 if name in _WANTED:
                     raise
-        return found
+        return plain
 
     def _find(self, call: ast.Call) -> None:
         """Note the folder of ``find_packages``, whose packages are looked up when needed."""

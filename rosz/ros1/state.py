@@ -1,8 +1,8 @@
 """The process-wide state of the ROS 1 modules: in rospy one process is one node.
 
-No other module of rosz has process-wide state. What a program creates before ``init_node`` waits
-here for the node. Modules such as rosnode and rosparam work without a node; they use the context
-here.
+No other module of rosz has process-wide state. Entities that a program creates before ``init_node``
+wait here for the node. Modules such as rosnode and rosparam work without a node; they use the
+context here.
 """
 
 from __future__ import annotations
@@ -17,40 +17,15 @@ from rosz import remap
 from rosz.errors import ClosedError
 from rosz.lifecycle import Lifecycle
 from rosz.node import Clock, Context, Node
-from rosz.params.api import Params
+from rosz.params.replica import Params
 from rosz.program import own
 from rosz.ros1.exceptions import ROSInitException
 from rosz.wire import Token
 
 if TYPE_CHECKING:
     from rosz.graph import View
-    from rosz.introspect.survey import Survey
+    from rosz.introspect import Survey
     from rosz.message import Message
-
-__all__ = (
-    "NO_NODE",
-    "UNNAMED",
-    "State",
-    "arguments",
-    "context",
-    "cooperate",
-    "find",
-    "has_node",
-    "is_shutdown",
-    "node",
-    "node_uri",
-    "params",
-    "params_of",
-    "ready_context",
-    "run_hooks",
-    "separate_states",
-    "set_arguments",
-    "state",
-    "survey",
-    "token_uri",
-    "unnamed_node",
-    "when_ready",
-)
 
 T = TypeVar("T")
 
@@ -138,14 +113,14 @@ def separate_states() -> None:
 class _Context(Context):
     """A context that runs rospy's shutdown hooks first, while everything still works.
 
-    What its nodes receive has tuples for sequences of numbers.
+    Messages that its nodes receive have tuples for sequences of numbers.
     """
 
     def decoder(self, message_type: type[Message]) -> Callable[[bytes], Any]:
         """Return the function that decodes messages of a class as ROS 1 code knows them."""
-        from rosz.message.tuples import decoder
+        from rosz.message import tuple_decoder
 
-        return decoder(message_type)
+        return tuple_decoder(message_type)
 
     def shutdown(self, reason: str = "") -> None:
         """Run rospy's hooks, then shut down; shutting down again is not an error."""
@@ -219,11 +194,7 @@ def context() -> Context:
 
 
 def ready_context() -> Context:
-    """Return the context once it is linked to its neighbours, or after 2 seconds.
-
-    Raises:
-        TransportError: The session cannot be opened.
-    """
+    """Return the context once it is linked to its neighbours, or after 2 seconds."""
     opened = context()
     opened.mesh.ready.wait(_READY_SECONDS)
     return opened
@@ -236,7 +207,7 @@ def survey() -> Survey:
         TransportError: The session cannot be opened.
         WaitTimeout: The network does not answer.
     """
-    from rosz.introspect.survey import Survey
+    from rosz.introspect import Survey
 
     opened = ready_context()
     try:
@@ -247,10 +218,10 @@ def survey() -> Survey:
 
 
 def find(look: Callable[[View], T]) -> T:
-    """Return what a function finds in the graph; after the shutdown, in what was known last.
+    """Return the result of a function of the graph; after the shutdown, of its last state.
 
     Args:
-        look: Function that raises `NotFoundError` if it does not find what it looks for.
+        look: Function that raises `NotFoundError` if its object is not there.
 
     Raises:
         NotFoundError: It is not there.
@@ -271,9 +242,9 @@ def node_uri(zid: str, node_id: int, host: str) -> str:
     return f"rosz://{host}/{zid}/{node_id}"
 
 
-def token_uri(found: Survey, token: Token) -> str:
+def token_uri(alive: Survey, token: Token) -> str:
     """Return the URI of the node of a token; the host of a ROS 2 node is ``unknown``."""
-    process = found.process(token)
+    process = alive.process(token)
     return node_uri(token.zid, token.node_id, process.host if process else "unknown")
 
 

@@ -10,8 +10,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 
-__all__ = ("Tool",)
-
 
 class Tool:
     """A tool of ROS 1.

@@ -1,27 +1,61 @@
 """Keys and rules: which links this machine accepts, and what each holder of a key may do.
 
 A folder of keys makes every link beyond the machine mutual TLS. Rules beside the keys say which
-names each holder of a key may publish, subscribe to, call, serve and set.
-
-Public modules beside the names exported here, because few programs need them:
-`rosz.security.authority` and `rosz.security.review`, which need the cryptography package, and
-`rosz.security.handshake` and `rosz.security.watch`, which need ssl; `rosz.security.reading`, which
-reads patterns of names from any YAML file.
+names each holder of a key may publish, subscribe to, call, serve and set. The names are imported
+on first use: few programs need ssl, and fewer the library cryptography.
 """
 
-from rosz.security.access import access_control
-from rosz.security.folder import CERTIFICATE, KeyFolder, LocalPermissions, read_trusted
-from rosz.security.rules import Permit, Rules, read_rules
+from __future__ import annotations
 
-PUBLIC_MODULES = ("authority", "handshake", "reading", "review", "watch")
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False  # typing takes longer to import than everything else here
+if TYPE_CHECKING:
+    from rosz.security.authority import Authority
+    from rosz.security.folder import (
+        CERTIFICATE,
+        KeyFolder,
+        KeyWatch,
+        LocalPermissions,
+        read_trusted,
+    )
+    from rosz.security.handshake import certificate_names, refusal, wants_keys
+    from rosz.security.patterns import PatternReader, compose, is_pattern, matches
+    from rosz.security.review import review_keys
+    from rosz.security.rules import EVERYTHING, Permit, Rules, read_rules
+    from rosz.security.zenoh_rules import access_control
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "authority": "Authority",
+            "folder": "CERTIFICATE KeyFolder KeyWatch LocalPermissions read_trusted",
+            "handshake": "certificate_names refusal wants_keys",
+            "patterns": "PatternReader compose is_pattern matches",
+            "review": "review_keys",
+            "rules": "EVERYTHING Permit Rules read_rules",
+            "zenoh_rules": "access_control",
+        },
+    )
 
 __all__ = (
     "CERTIFICATE",
+    "EVERYTHING",
+    "Authority",
     "KeyFolder",
+    "KeyWatch",
     "LocalPermissions",
+    "PatternReader",
     "Permit",
     "Rules",
     "access_control",
+    "certificate_names",
+    "compose",
+    "is_pattern",
+    "matches",
     "read_rules",
     "read_trusted",
+    "refusal",
+    "review_keys",
+    "wants_keys",
 )

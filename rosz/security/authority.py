@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
     from cryptography.x509 import Certificate, GeneralName, Name
 
-__all__ = ("Authority", "excluded_names", "own_name", "read_certificate")
-
 _HOME = "authority"
 _REVOKED = "revoked"
 _OWN_DOMAIN = ".key.invalid"
@@ -142,8 +140,10 @@ class Authority:
         """
         home = self.folder / name
         if name == _HOME or not _NAME.fullmatch(name) or not (home / CERTIFICATE).is_file():
-            known = sorted(file.parent.name for file in self.folder.glob(f"*/{AUTHORITY}"))
-            hint = near_miss(name, known) or f"; there are keys of {', '.join(known) or 'nobody'}"
+            holders = sorted(file.parent.name for file in self.folder.glob(f"*/{AUTHORITY}"))
+            hint = (
+                near_miss(name, holders) or f"; there are keys of {', '.join(holders) or 'nobody'}"
+            )
             raise UsageError(f"'{name}' has no keys in '{self.folder}'{hint}")
         own = own_name(read_certificate(home / CERTIFICATE)) or name
         self.certificate = self._excluding([*excluded_names(self.certificate), own])
@@ -181,8 +181,8 @@ def own_name(certificate: Certificate) -> str:
     from cryptography.x509 import DNSName, SubjectAlternativeName
 
     names = certificate.extensions.get_extension_for_class(SubjectAlternativeName).value
-    found = (one for one in names.get_values_for_type(DNSName) if one.endswith(_OWN_DOMAIN))
-    return next(found, "")
+    own = (name for name in names.get_values_for_type(DNSName) if name.endswith(_OWN_DOMAIN))
+    return next(own, "")
 
 
 def excluded_names(certificate: Certificate) -> list[str]:
@@ -190,10 +190,10 @@ def excluded_names(certificate: Certificate) -> list[str]:
     from cryptography import x509
 
     try:
-        found = certificate.extensions.get_extension_for_class(x509.NameConstraints).value
+        constraints = certificate.extensions.get_extension_for_class(x509.NameConstraints).value
     except x509.ExtensionNotFound:
         return []
-    return [str(one.value) for one in found.excluded_subtrees or ()]
+    return [str(name.value) for name in constraints.excluded_subtrees or ()]
 
 
 def _sign(

@@ -8,34 +8,26 @@
     rules.yaml         what others may do; everything if there is no such file
 
 ``rosz keys`` makes such a folder for each machine, inside one that also holds the key of the
-authority. Given the outer folder, a machine uses the folder that has its host name.
+authority. Given the outer folder, a machine uses the folder that has its host name. A `KeyWatch`
+notices changes while a program runs.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
-from rosz.errors import UsageError
+from rosz.errors import RoszError, UsageError
 from rosz.security.rules import Permit, Rules, read_rules
 from rosz.wire import Kind
 
-__all__ = (
-    "AUTHORITY",
-    "CERTIFICATE",
-    "KEY",
-    "RULES",
-    "KeyFolder",
-    "LocalPermissions",
-    "check_private",
-    "check_trusted",
-    "load_rules",
-    "read_trusted",
-)
+_log = logging.getLogger("rosz.keys")
 
 AUTHORITY = "authority.pem"
 CERTIFICATE = "certificate.pem"
@@ -61,7 +53,7 @@ class KeyFolder(msgspec.Struct, frozen=True):
 
     Attributes:
         path: The folder.
-        rules: What others may do; everything when ``None``.
+        rules: Permissions of others; everything when ``None``.
         rules_file: The file of the rules.
         places_of_rules: Where the rules may be; the first file that exists counts.
     """
@@ -84,7 +76,10 @@ class KeyFolder(msgspec.Struct, frozen=True):
                 this machine trusts.
             YamlError: The rules cannot be read.
         """
-        own = next((one for one in (folder, folder / host) if (one / KEY).is_file()), None)
+        own = next(
+            (candidate for candidate in (folder, folder / host) if (candidate / KEY).is_file()),
+            None,
+        )
         if own is None:
             raise UsageError(
                 f"no key in '{folder}' (ROSZ_KEYS): expected '{KEY}' there or in a folder"
@@ -95,9 +90,9 @@ class KeyFolder(msgspec.Struct, frozen=True):
                 raise UsageError(f"'{own}' has a key but no '{name}'; copy the whole folder")
         check_private(own / KEY)
         check_trusted(own / AUTHORITY)
-        places = tuple(dict.fromkeys((own / RULES, folder / RULES)))
-        file = next(filter(os.path.lexists, places), None)
-        return cls(own, None if file is None else load_rules(file), file, places)
+        rules = tuple(dict.fromkeys((own / RULES, folder / RULES)))
+        file = next(filter(os.path.lexists, rules), None)
+        return cls(own, None if file is None else load_rules(file), file, rules)
 
     @property
     def authority(self) -> Path:
@@ -118,12 +113,12 @@ class KeyFolder(msgspec.Struct, frozen=True):
 class LocalPermissions:
     """The permissions of this machine according to its rules.
 
-    Other machines refuse what their rules do not permit, and say nothing. If all machines have the
+    Other machines refuse silently if their rules do not permit something. If all machines have the
     same rules, and these name this machine, it can be warned at once.
 
     Args:
         holder: The name of the machine in the rules.
-        permit: What the machine may do.
+        permit: Permissions of the machine.
         file: The file of the rules.
     """
 
@@ -218,3 +213,54 @@ def read_trusted(file: Path) -> str:
         return file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"cannot read '{file}': {error}") from error
+
+
+class KeyWatch:
+    """Tells, each time it is called, whether keys and rules are others than at its start.
+
+    A file that is being copied, or has a mistake, changes nothing until it is whole and right.
+
+    Args:
+        find: Function that finds and checks the keys; see `KeyFolder.find`.
+
+    Raises:
+        UsageError: There are no keys, or others may read or write them.
+        YamlError: The rules cannot be read.
+    """
+
+    def __init__(self, find: Callable[[], KeyFolder]) -> None:
+        self._find = find
+        keys = find()
+        self._files = (keys.authority, keys.certificate, keys.key, *keys.places_of_rules)
+        self._known = self._last = self._read()
+        self._folder = keys.path
+
+    def change(self) -> str:
+        """Return that keys or rules have changed; empty if they have not."""
+        signature, before = self._read(), self._last
+        self._last = signature
+        if signature == self._known or signature != before:
+            return ""
+        self._known = signature
+        import ssl  # few programs need it
+
+        try:
+            keys = self._find()
+            context = ssl.create_default_context(cafile=keys.authority)
+            context.load_cert_chain(keys.certificate, keys.key)
+        except (RoszError, OSError, ValueError) as error:
+            _log.warning("changed keys or rules are not used: %s", error)
+            return ""
+        return f"keys or rules in '{self._folder}' have changed"
+
+    def _read(self) -> tuple[tuple[int, int, int] | None, ...]:
+        return tuple(map(_signature, self._files))
+
+
+def _signature(file: Path) -> tuple[int, int, int] | None:
+    """Return numbers that change with the content of a file; None if there is no file."""
+    try:
+        status = file.stat()
+    except OSError:
+        return None
+    return status.st_ino, status.st_size, status.st_mtime_ns

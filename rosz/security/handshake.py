@@ -1,6 +1,6 @@
 """Finding out why a link with keys is refused, by this machine or by the other end.
 
-Zenoh keeps trying and says little. One TLS handshake with the same keys says what is wrong.
+Zenoh keeps trying and says little. One TLS handshake with the same keys tells the reason.
 """
 
 from __future__ import annotations
@@ -11,8 +11,6 @@ from contextlib import suppress
 
 from rosz.security.folder import KeyFolder
 from rosz.wire import Endpoint
-
-__all__ = ("certificate_names", "refusal", "wants_keys")
 
 _OTHER_NAME = {62, 64}
 """The codes of OpenSSL for a certificate of another host name or address."""
@@ -48,7 +46,10 @@ def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
             link.recv(1)
     except TimeoutError as error:
         if "handshake" in str(error):
-            return "it does not speak TLS: 'ROSZ_KEYS' is missing there, or it is not Zenoh"
+            return (
+                f"it says nothing within {timeout:g} s: it hangs, it is not Zenoh, or 'ROSZ_KEYS'"
+                " is missing there"
+            )
         return "" if "read" in str(error) else f"no answer within {timeout:g} s"
     except ssl.SSLCertVerificationError as error:
         reason = f"its certificate is refused here: {error.verify_message}"
@@ -68,7 +69,9 @@ def refusal(endpoint: Endpoint, keys: KeyFolder, timeout: float = 2.0) -> str:
 
 
 def wants_keys(endpoint: Endpoint, timeout: float = 1.0) -> bool:
-    """Tell whether an endpoint speaks TLS, so that a link to it needs keys.
+    """Tell whether an endpoint asks for a certificate, so that a link to it needs keys.
+
+    A gateway that answers for others may speak TLS and ask for none.
 
     Args:
         endpoint: The endpoint to connect to, such as ``tcp/robot1:7447``.
@@ -81,11 +84,15 @@ def wants_keys(endpoint: Endpoint, timeout: float = 1.0) -> bool:
     try:
         with (
             socket.create_connection((endpoint.host, endpoint.port), timeout) as plain,
-            context.wrap_socket(plain),
+            context.wrap_socket(plain) as link,
         ):
-            return True
+            link.settimeout(_ALERT_BY)
+            link.recv(1)
+    except ssl.SSLError as error:
+        return "CERTIFICATE_REQUIRED" in (error.reason or "")
     except (OSError, ValueError):
-        return False
+        pass
+    return False
 
 
 def certificate_names(keys: KeyFolder) -> tuple[str, ...]:

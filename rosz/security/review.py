@@ -1,4 +1,4 @@
-"""The review of a folder of keys: who has keys, until when, and what is wrong with them."""
+"""The review of a folder of keys: their holders, when they expire, and mistakes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,6 @@ from rosz.security.rules import ANYBODY, NAME_VERBS, Permit
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate
 
-__all__ = ("Holder", "Review", "RuleFile", "review")
-
 _SOON = dt.timedelta(days=30)
 _HOME = "authority"
 
@@ -52,7 +50,7 @@ class RuleFile(msgspec.Struct, frozen=True):
 
     Attributes:
         file: The file.
-        allowed: What each holder may do, one line for each kind of permission.
+        allowed: Permissions of each holder, one line for each kind of permission.
     """
 
     file: str
@@ -73,7 +71,7 @@ class Review(msgspec.Struct):
     wrong: list[str] = []
 
 
-def review(folder: Path, now: dt.datetime | None = None) -> Review:
+def review_keys(folder: Path, now: dt.datetime | None = None) -> Review:
     """Review a folder: all keys with their authority, or those of one machine.
 
     Args:
@@ -84,37 +82,37 @@ def review(folder: Path, now: dt.datetime | None = None) -> Review:
         UsageError: There are no keys in the folder.
     """
     now = now or dt.datetime.now(dt.UTC)
-    found = Review()
-    one = (folder / CERTIFICATE).is_file()
-    homes = [folder] if one else sorted(file.parent for file in folder.glob(f"*/{CERTIFICATE}"))
+    review = Review()
+    single = (folder / CERTIFICATE).is_file()
+    homes = [folder] if single else sorted(file.parent for file in folder.glob(f"*/{CERTIFICATE}"))
     if not homes:
         raise UsageError(f"no keys in '{folder}': 'rosz keys init {folder}' makes an authority")
     for home in homes:
         try:
-            _review_keys(home, now, found)
+            _review_keys(home, now, review)
         except RoszError as error:
-            found.wrong.append(str(error))
+            review.wrong.append(str(error))
     for file in [folder / RULES, *(home / RULES for home in homes if home != folder)]:
         if os.path.lexists(file):
-            _review_rules(file, found, complete=not one)
-    return found
+            _review_rules(file, review, complete=not single)
+    return review
 
 
-def _review_keys(home: Path, now: dt.datetime, found: Review) -> None:
+def _review_keys(home: Path, now: dt.datetime, review: Review) -> None:
     certificate = read_certificate(home / CERTIFICATE)
     if (home / KEY).is_file():
         check_private(home / KEY)
     elif home.name != _HOME:
-        found.wrong.append(f"'{home}' has no '{KEY}'")
+        review.wrong.append(f"'{home}' has no '{KEY}'")
     until = certificate.not_valid_after_utc
     name = _name(certificate)
     if until <= now:
-        found.wrong.append(f"'{name}' ended on {until:%Y-%m-%d}: 'rosz keys add {name}' anew")
+        review.wrong.append(f"'{name}' ended on {until:%Y-%m-%d}: 'rosz keys add {name}' anew")
     elif until - now < _SOON:
-        found.wrong.append(f"'{name}' ends on {until:%Y-%m-%d}, in {(until - now).days} days")
+        review.wrong.append(f"'{name}' ends on {until:%Y-%m-%d}, in {(until - now).days} days")
     if home.name == _HOME:
         return
-    found.holders.append(Holder(name, _places(certificate, name), until, str(home)))
+    review.holders.append(Holder(name, _places(certificate, name), until, str(home)))
     _check_signature(home, certificate)
 
 
@@ -130,20 +128,20 @@ def _check_signature(home: Path, certificate: Certificate) -> None:
         raise UsageError(f"'{home}' has no '{AUTHORITY}'") from error
 
 
-def _review_rules(file: Path, found: Review, *, complete: bool) -> None:
+def _review_rules(file: Path, review: Review, *, complete: bool) -> None:
     try:
         rules = load_rules(file)
     except RoszError as error:
-        found.wrong.append(str(error))
+        review.wrong.append(str(error))
         return
     allowed = {name: _allowed(permit) for name, permit in rules.permits.items()}
-    found.rules.append(RuleFile(str(file), allowed))
-    known = {holder.name for holder in found.holders} | {ANYBODY}
+    review.rules.append(RuleFile(str(file), allowed))
+    holders = {holder.name for holder in review.holders} | {ANYBODY}
     if complete:
-        found.wrong += [
+        review.wrong += [
             f"'{file}' allows '{name}' something, who has no keys"
             for name in rules.permits
-            if name not in known
+            if name not in holders
         ]
 
 
@@ -169,4 +167,4 @@ def _places(certificate: Certificate, name: str) -> tuple[str, ...]:
 
     names = certificate.extensions.get_extension_for_class(SubjectAlternativeName).value
     hidden = {name, own_name(certificate)}
-    return tuple(str(one.value) for one in names if str(one.value) not in hidden)
+    return tuple(str(place.value) for place in names if str(place.value) not in hidden)

@@ -12,8 +12,8 @@
     "*":                      # everybody who has a key
       subscribe: [/map]
 
-``*`` stands for any part of one chunk of a name, ``**`` for any number of chunks. What is not
-allowed is refused.
+``*`` stands for any part of one chunk of a name, ``**`` for any number of chunks. All else is
+refused.
 """
 
 from __future__ import annotations
@@ -24,9 +24,7 @@ import msgspec
 import yaml
 
 from rosz.errors import near_miss
-from rosz.security.reading import NodeReader, compose, matches
-
-__all__ = ("ANYBODY", "EVERYTHING", "NAME_VERBS", "Permit", "Rules", "read_rules")
+from rosz.security.patterns import PatternReader, compose, matches
 
 ANYBODY: Final = "*"
 EVERYTHING: Final = "/**"
@@ -76,7 +74,7 @@ class Rules(msgspec.Struct, frozen=True):
     """The access rules: the permissions of all holders of keys.
 
     Attributes:
-        permits: What each holder may do, by the name in its certificate; what all may do is under
+        permits: Permissions of each holder, by the name in its certificate; those of all are under
             `ANYBODY`.
     """
 
@@ -93,10 +91,10 @@ class Rules(msgspec.Struct, frozen=True):
         return msgspec.convert({**names, **flags}, Permit)
 
     def permit_at_bridge(self, name: str) -> Permit:
-        """Return what clients of a bridge may do, who have no keys.
+        """Return the permissions of clients of a bridge, who have no keys.
 
         Args:
-            name: Name of the bridge in the rules. What all may do counts if they do not have it.
+            name: Name of the bridge in the rules; without it there, the permissions of all count.
         """
         return self.permit_of(name) or self.permits.get(ANYBODY) or Permit()
 
@@ -114,12 +112,12 @@ def read_rules(text: str, file: str) -> Rules:
     top = compose(text, file)
     if top is None:
         return Rules({})
-    reader = _Reader(file)
+    reader = _RulesReader(file)
     holders = reader.items(top, "key holders")
     return Rules({str(name.value): reader.permit(value) for name, value in holders})
 
 
-class _Reader(NodeReader):
+class _RulesReader(PatternReader):
     """Converts the nodes of a YAML document; its errors say where the mistake is."""
 
     def permit(self, node: yaml.Node) -> Permit:
@@ -131,14 +129,11 @@ class _Reader(NodeReader):
         for key, value in self.items(node, "permissions"):
             verb = str(key.value)
             if verb in NAME_VERBS:
-                given[verb] = self._patterns(value)
+                given[verb] = tuple(self.pattern(*part) for part in self.listed(value))
             elif verb in _FLAGS:
                 given[verb] = self.flag(value)
             else:
-                known = (*NAME_VERBS, *_FLAGS)
-                hint = f"{near_miss(verb, known)}; expected one of {', '.join(known)}"
+                verbs = (*NAME_VERBS, *_FLAGS)
+                hint = f"{near_miss(verb, verbs)}; expected one of {', '.join(verbs)}"
                 raise self.error(key, f"'{verb}' is not a permission{hint}")
         return msgspec.convert(given, Permit)
-
-    def _patterns(self, node: yaml.Node) -> tuple[str, ...]:
-        return tuple(self.pattern(part, text) for part, text in self.listed(node))

@@ -1,16 +1,20 @@
 """The network: sessions, and what is declared on them. No other package imports zenoh.
 
-Only ``rosz core`` needs the modules in `PUBLIC_MODULES`.
+The names that only ``rosz core`` needs are imported on first use.
 """
 
-from rosz.session import at_exit as at_exit  # registers what waits at the exit
+from __future__ import annotations
+
+from rosz.lazy import exports_of
+from rosz.session import at_exit as at_exit  # it registers a function for the exit
+from rosz.session.at_exit import on_loss
 from rosz.session.config import SessionConfig, connect_endpoint, keys_of, listen_endpoints
 from rosz.session.declared import PullSubscriber, RawPublisher
-from rosz.session.dialling import Dialling, Waiting, find_waiting, linked_session, who_answers
+from rosz.session.dialling import Dialling, find_waiting, linked_session
 from rosz.session.local_peers import LocalPeers, describe_process, is_stopped
 from rosz.session.mesh import MeshReadiness, serve_links
 from rosz.session.opening import places_of
-from rosz.session.probe import first_listening, is_listening, why_refused
+from rosz.session.probe import first_listening, is_listening, present_loopback, why_refused
 from rosz.session.queries import (
     LONGEST_WAIT,
     Cancellation,
@@ -19,19 +23,33 @@ from rosz.session.queries import (
     Replies,
     Reply,
     clamp_timeout,
+    is_key_in,
 )
 from rosz.session.samples import HybridClock, Sample, Stamp
 from rosz.session.session import Session
 from rosz.session.zenoh_workarounds import SEGMENTS
 
-PUBLIC_MODULES = ("restart", "router", "split", "standstill")
-"""Modules that few programs need, and that others may import as they are."""
+TYPE_CHECKING = False  # typing takes long to import
+if TYPE_CHECKING:
+    from rosz.session.restart import restart_program, take_handover
+    from rosz.session.router import ExternalRouter, Router, zenoh_configuration
+    from rosz.session.stale_links import SplitWatch, SuspensionDetector
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "restart": "restart_program take_handover",
+            "router": "ExternalRouter Router zenoh_configuration",
+            "stale_links": "SplitWatch SuspensionDetector",
+        },
+    )
 
 __all__ = (
     "LONGEST_WAIT",
     "SEGMENTS",
     "Cancellation",
     "Dialling",
+    "ExternalRouter",
     "HybridClock",
     "LocalPeers",
     "MeshReadiness",
@@ -41,23 +59,30 @@ __all__ = (
     "RawPublisher",
     "Replies",
     "Reply",
+    "Router",
     "Sample",
     "Session",
     "SessionConfig",
+    "SplitWatch",
     "Stamp",
-    "Waiting",
+    "SuspensionDetector",
     "clamp_timeout",
     "connect_endpoint",
     "describe_process",
     "find_waiting",
     "first_listening",
+    "is_key_in",
     "is_listening",
     "is_stopped",
     "keys_of",
     "linked_session",
     "listen_endpoints",
+    "on_loss",
     "places_of",
+    "present_loopback",
+    "restart_program",
     "serve_links",
-    "who_answers",
+    "take_handover",
     "why_refused",
+    "zenoh_configuration",
 )

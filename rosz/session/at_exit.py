@@ -4,37 +4,45 @@ The Python runtime aborts a program that ends while one of its threads is inside
 of the end all sessions are closed, so such a thread is about to leave, and the program waits for
 it. To free an object of Zenoh is a call into Zenoh as well. So code in this package deletes the
 last name of each object in a function that is still running.
+
+From when `rosz.worker.ENDING` is set nobody may start to wait inside Zenoh. The function that calls
+Zenoh has to check it itself. Then either `wait_for_calls` sees that function on a stack, or the
+function sees that it is set.
 """
 
 from __future__ import annotations
 
 import atexit
+import logging
+import os
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from rosz.errors import ClosedError
-
-__all__ = ("ENDING", "OPEN", "ClosedSession", "leak_at_exit", "wait_for_calls")
-
-ENDING = threading.Event()
-"""Set when the interpreter is about to end: from then on nobody may start to wait inside Zenoh.
-
-The function that calls Zenoh has to check it itself. Then either `wait_for_calls` sees that
-function on a stack, or the function sees that this is set.
-"""
+from rosz.worker import ENDING
 
 OPEN: set[object] = set()
 """Queues to which threads that Zenoh started add items; a thread removes its queue when it ends."""
 
+_ZENOH_THREAD = "(pyo3-closure)"
+"""The end of the names of threads that Zenoh's binding starts for callbacks, as in its 1.7 to 1.10.
+Those of rosz are daemons. One whose queue is removed, or whose declaration was refused, may still
+be inside Zenoh for a moment."""
+
 _leaked: list[object] = []
+_lost = threading.Lock()
+_loss_handlers: list[Callable[[str], object]] = []
 _PACKAGE = str(Path(__file__).parent)
 _POLL_SECONDS = 0.001
 _TIMEOUT = 10.0
 """Seconds; a thread of a busy machine may need more than one to leave."""
+
+_log = logging.getLogger("rosz.session")
 
 
 def leak_at_exit(thing: object) -> None:
@@ -45,7 +53,8 @@ def leak_at_exit(thing: object) -> None:
 def wait_for_calls(timeout: float) -> bool:
     """Set `ENDING`, and wait until nothing is `OPEN`, and no other thread inside this package.
 
-    A thread with a function of it anywhere on its stack may be inside Zenoh, or return to it.
+    A thread with a function of it anywhere on its stack may be inside Zenoh, or return to it. The
+    threads that Zenoh started for rosz have to end, since no stack shows that one is inside Zenoh.
 
     Args:
         timeout: Time limit in seconds.
@@ -64,6 +73,11 @@ def wait_for_calls(timeout: float) -> bool:
         if time.monotonic() > deadline:
             return False
         time.sleep(_POLL_SECONDS)
+    for zenoh_thread in threading.enumerate():
+        if zenoh_thread.daemon and zenoh_thread.name.endswith(_ZENOH_THREAD):
+            zenoh_thread.join(max(0.0, deadline - time.monotonic()))
+            if zenoh_thread.is_alive():
+                return False
     return True
 
 
@@ -73,6 +87,25 @@ def _is_in_package(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
+
+
+def on_loss(handle: Callable[[str], object]) -> None:
+    """Let a function end this program, by a reason, when its sessions are lost."""
+    _loss_handlers.append(handle)
+
+
+def lose_sessions(why: str) -> None:
+    """End the program with 1, or as `on_loss` says, since no session of it works any more.
+
+    Closing a lost session may never return. Only the first call has an effect.
+    """
+    if not _lost.acquire(blocking=False):
+        return
+    _log.critical("the network of this program is lost, and it ends: %s", why)
+    for handle in _loss_handlers:
+        handle(why)
+    if not _loss_handlers:
+        os._exit(1)
 
 
 class ClosedSession:

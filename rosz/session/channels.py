@@ -1,4 +1,4 @@
-"""Channels, in which what arrives waits until a thread of Python receives it.
+"""Channels, in which arrived items wait until a thread of Python receives them.
 
 No Python runs on the threads of Zenoh. A link would wait for Python's lock there. To undeclare an
 advanced publisher, Zenoh waits for its own threads while it holds that lock. And the interpreter
@@ -21,22 +21,13 @@ from rosz.program import current, within
 from rosz.session.at_exit import OPEN
 from rosz.worker import lend_thread
 
-__all__ = (
-    "CallbackQueue",
-    "Channel",
-    "declare",
-    "declare_callback",
-    "declare_rare",
-    "open_channel",
-)
-
 T = TypeVar("T")
 
 _CHANNEL_SIZE = 1 << 20
 """Capacity of a channel: more items than ever arrive before a thread of Python receives them."""
 
 
-class Channel(Protocol):
+class ItemChannel(Protocol):
     """Where threads of Python receive items."""
 
     def recv(self) -> Any:
@@ -63,7 +54,7 @@ def open_channel() -> Any:
     return zenoh.handlers.FifoChannel(_CHANNEL_SIZE)
 
 
-def declare(declaring: Callable[[Any], T]) -> tuple[T, Channel]:
+def declare(declaring: Callable[[Any], T]) -> tuple[T, ItemChannel]:
     """Declare something for which many items arrive.
 
     Args:
@@ -76,17 +67,12 @@ def declare(declaring: Callable[[Any], T]) -> tuple[T, Channel]:
     return entity, entity.handler
 
 
-def declare_rare(declaring: Callable[[Any], T]) -> tuple[T, Channel]:
+def declare_rare(declaring: Callable[[Any], T]) -> tuple[T, ItemChannel]:
     """Declare something for which items arrive rarely: a thread that waits for them sleeps.
 
     A thread of Python that Zenoh starts puts the items in the channel. Its link waits when 256 of
-    them have arrived while other threads hold Python's lock, so this is not for data.
-
-    Args:
-        declaring: Function that declares it with a handler.
-
-    Returns:
-        The object of Zenoh, and the channel of the items.
+    them have arrived while other threads hold Python's lock, so this is not for data. Arguments and
+    result are those of `declare`.
     """
     if not threading.main_thread().is_alive():  # Zenoh might not be able to start its thread
         return declare(declaring)
@@ -94,7 +80,7 @@ def declare_rare(declaring: Callable[[Any], T]) -> tuple[T, Channel]:
     return _declare_on_daemon(declaring, channel.handler), channel
 
 
-def declare_callback(declaring: Callable[[Any], T]) -> tuple[T, Channel | CallbackQueue]:
+def declare_callback(declaring: Callable[[Any], T]) -> tuple[T, ItemChannel | CallbackQueue]:
     """Declare something for which items arrive rarely: no thread waits for them.
 
     The limits of `declare_rare` apply.
@@ -144,9 +130,6 @@ class _RareChannel:
 
     Neither function of the callback is one of Python: once its thread has closed the channel, it
     does not ask for Python's lock any more.
-
-    Attributes:
-        handler: The handler to declare something with.
     """
 
     def __init__(self) -> None:

@@ -22,28 +22,13 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import UsageError
+from rosz.session.probe import present_loopback
 from rosz.wire import Endpoint, id_prefix
 
 if TYPE_CHECKING:
     import zenoh
 
     from rosz.security import KeyFolder
-
-__all__ = (
-    "EPHEMERAL",
-    "SessionConfig",
-    "addresses_of",
-    "connect_endpoint",
-    "insert_setting",
-    "is_own",
-    "keys_of",
-    "listen_endpoints",
-    "loopback_interfaces",
-    "new_id",
-    "overrides",
-    "read_setting",
-    "zenoh_settings",
-)
 
 _RETRY_MS = 200
 """Milliseconds between attempts to connect, on average: of many sessions that lost one router, not
@@ -77,15 +62,14 @@ _LOCAL_QUEUE = {
 """The queue of a link of this machine. 16 batches of 64 kB are the most that Zenoh allows: some
 thousand small messages that are published at once, or one image.
 
-By default Zenoh drops what finds no room for a millisecond. On a busy machine, its own threads may
-not run for longer, and a second image would be lost. The times are in microseconds: for a message,
-and added for the rest of one that is larger than a batch. A subscriber that is stopped delays a
-publisher by as much once; after that, Zenoh drops for its link without waiting until it reads."""
+By default Zenoh drops a message that finds no room for a millisecond. On a busy machine, its own
+threads may not run for longer, and a second image would be lost. The times are in microseconds: for
+a message, and added for the rest of one that is larger than a batch. A subscriber that is stopped
+delays a publisher by as much once; after that, Zenoh drops for its link without waiting until it
+reads."""
 _ROUTER_TIMEOUT = 10.0
 """Seconds that a node waits for its router, which may have been started just before it."""
 
-EPHEMERAL = "tcp/127.0.0.1:0"
-"""Endpoint at which a peer listens for sessions of its machine, on any free port."""
 _AUTOCONNECT = {"router": ["router"], "peer": ["router", "peer"], "client": ["router"]}
 """The sessions found by multicast that each mode connects to; Zenoh's routers connect to none."""
 _ONE_DIALS = {"autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}}}
@@ -228,34 +212,16 @@ def _random_digits(count: int) -> str:
 
 def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
     """Return the Zenoh configuration, as nested dictionaries."""
-    connect = [*config.connect]
-    if (config.mode != "router" or config.rendezvous_is_held) and not config.beyond:
-        connect.insert(0, config.rendezvous)
-    if config.keys is not None:
-        connect = [connect_endpoint(endpoint) for endpoint in connect]
-    listen = _listen(config)
-    local = not config.reaches_beyond
-    # Zenoh tries just once with 0: enough for a rendezvous that the session may hold itself.
-    timeout_ms = _FOREVER_MS if config.connect or config.rendezvous_is_held else 0
+    local, must_connect = not config.reaches_beyond, _must_connect(config)
     sharing = {"enabled": True, "message_size_threshold": config.shared_memory}
-    must_listen = config.mode == "router"
-    must_connect = config.must_connect or config.mode == "client"
-    retry = _RETRY_MS
-    if not must_listen:
-        retry = _RETRY_MS // 2 + int.from_bytes(os.urandom(2)) % _RETRY_MS
     return {
         "mode": config.mode,
-        "connect": {
-            "endpoints": connect,
-            "exit_on_failure": must_connect,
-            "timeout_ms": int(config.open_timeout * 1000) if must_connect else timeout_ms,
-            "retry": {
-                "period_init_ms": retry,
-                "period_max_ms": retry if local else _LONGEST_RETRY_MS,
-                "period_increase_factor": 1.5,
-            },
+        "connect": _connecting(config, local=local),
+        "listen": {
+            "endpoints": _listen(config),
+            "exit_on_failure": config.mode == "router",
+            "timeout_ms": 0,
         },
-        "listen": {"endpoints": listen, "exit_on_failure": must_listen, "timeout_ms": 0},
         "open": {"return_conditions": dict.fromkeys(("connect_scouted", "declares"), must_connect)},
         "scouting": {
             "multicast": {"enabled": config.multicast, "autoconnect": _AUTOCONNECT},
@@ -274,6 +240,36 @@ def zenoh_settings(config: SessionConfig) -> dict[str, Any]:
                     "queue": _LOCAL_QUEUE if local else {},
                 }
             },
+        },
+    }
+
+
+def _must_connect(config: SessionConfig) -> bool:
+    return config.must_connect or config.mode == "client"
+
+
+def _connecting(config: SessionConfig, *, local: bool) -> dict[str, Any]:
+    """Return the settings of connecting to others."""
+    endpoints = [*config.connect]
+    if (config.mode != "router" or config.rendezvous_is_held) and not config.beyond:
+        endpoints.insert(0, config.rendezvous)
+    if config.keys is not None:
+        endpoints = [connect_endpoint(endpoint) for endpoint in endpoints]
+    # Zenoh tries just once with 0: enough for a rendezvous that the session may hold itself.
+    timeout_ms = _FOREVER_MS if config.connect or config.rendezvous_is_held else 0
+    if must_connect := _must_connect(config):
+        timeout_ms = int(config.open_timeout * 1000)
+    retry = _RETRY_MS
+    if config.mode != "router":
+        retry = _RETRY_MS // 2 + int.from_bytes(os.urandom(2)) % _RETRY_MS
+    return {
+        "endpoints": [*map(_present, endpoints)],
+        "exit_on_failure": must_connect,
+        "timeout_ms": timeout_ms,
+        "retry": {
+            "period_init_ms": retry,
+            "period_max_ms": retry if local else _LONGEST_RETRY_MS,
+            "period_increase_factor": 1.5,
         },
     }
 
@@ -300,12 +296,24 @@ def _listen(config: SessionConfig) -> list[str]:
     if config.beyond:
         places = tuple(_share_port(config))
     elif config.rendezvous_is_held:
-        places = (EPHEMERAL, *_share_port(config))
+        places = (ephemeral(), *_share_port(config))
     elif config.mode == "router" or (config.mode == "peer" and config.hold_rendezvous):
         places = listen_endpoints(config.rendezvous, places, keys=keys)
     if config.mode == "peer":
-        places = (*places, _EPHEMERAL_EVERYWHERE if config.multicast else EPHEMERAL)
-    return [str(Endpoint(place).secured()) for place in places] if keys else [*places]
+        places = (*places, _EPHEMERAL_EVERYWHERE if config.multicast else ephemeral())
+    return [_present(str(Endpoint(place).secured()) if keys else place) for place in places]
+
+
+def _present(text: str) -> str:
+    """Return an endpoint, at ``::1`` if it is one of an IPv4 loopback that is not there."""
+    host = Endpoint(text).host
+    present = present_loopback(host)
+    return text if present == host else text.replace(f"/{host}:", f"/[{present}]:", 1)
+
+
+def ephemeral() -> str:
+    """Return the endpoint at which a peer listens for sessions of its machine, on any free port."""
+    return _present("tcp/127.0.0.1:0")
 
 
 def overrides(text: str) -> Mapping[str, str]:
@@ -314,13 +322,13 @@ def overrides(text: str) -> Mapping[str, str]:
     Raises:
         UsageError: A part is not of the form ``path=json``.
     """
-    found: dict[str, str] = {}
+    settings: dict[str, str] = {}
     for part in filter(None, (piece.strip() for piece in text.split(";"))):
         key, separator, value = part.partition("=")
         if not separator:
             raise UsageError(f"ZENOH_CONFIG_OVERRIDE has '{part}'; expected 'path/to/key=json'")
-        found[key.strip()] = value.strip()
-    return found
+        settings[key.strip()] = value.strip()
+    return settings
 
 
 def connect_endpoint(text: str) -> str:
@@ -368,24 +376,17 @@ def listen_endpoints(
         if endpoint.is_tcp and endpoint.is_any_address and endpoint.port == meeting.port
         if not endpoint.configuration
     ]
-    held = []
+    local: list[Endpoint] = []
     if wide and meeting.protocol == "tcp" and meeting.port is not None:
         addresses = addresses_of(meeting.host)
-        held = [Endpoint.of("tcp", address, meeting.port) for address in addresses]
-    if not held:
-        found = [meeting, *others]
+        local = [Endpoint.of("tcp", address, meeting.port) for address in addresses]
+    if not local:
+        places = [meeting, *others]
     elif any(endpoint.protocol == "tls" for endpoint in wide) and sys.platform == "linux":
-        found = []
-        for endpoint in others:
-            found += _on_each_interface(endpoint) if endpoint in wide else [endpoint]
-        found += [one.on_interface(name) for one in held for name in loopback_interfaces()]
+        places = _on_interfaces(local, others, wide)
     else:
-        hosts = {endpoint.host for endpoint in wide}
-        all_v4, all_v6 = "0.0.0.0" in hosts, "::" in hosts  # noqa: S104
-        # On Linux, :: serves IPv4 as well.
-        rest = [one for one in held if not (all_v6 or (all_v4 and one.host.startswith("127.")))]
-        found = [*others, *rest]
-    return tuple(dict.fromkeys(map(str, found)))
+        places = [*others, *_not_among(local, {endpoint.host for endpoint in wide})]
+    return tuple(dict.fromkeys(map(str, places)))
 
 
 def _share_port(config: SessionConfig) -> Iterator[str]:
@@ -413,11 +414,24 @@ def loopback_interfaces() -> list[str]:
     return [name for name in names if _interface_type(name) == _LOOPBACK]
 
 
-def _on_each_interface(endpoint: Endpoint) -> Iterator[Endpoint]:
-    """Yield an endpoint of all addresses once for each interface to other machines."""
-    for _, name in socket.if_nameindex():
-        if _is_beyond(name):
-            yield endpoint.on_interface(name)
+def _not_among(local: list[Endpoint], hosts: set[str]) -> list[Endpoint]:
+    """Return the endpoints of this machine that listening at some hosts does not include."""
+    if "::" in hosts:  # on Linux, it serves IPv4 as well
+        return []
+    all_v4 = "0.0.0.0" in hosts  # noqa: S104
+    return [place for place in local if not (all_v4 and place.host.startswith("127."))]
+
+
+def _on_interfaces(
+    local: list[Endpoint], others: list[Endpoint], wide: list[Endpoint]
+) -> list[Endpoint]:
+    """Return endpoints of one port, each at its interfaces; `wide` are those for all addresses."""
+    beyond = [name for _, name in socket.if_nameindex() if _is_beyond(name)]
+    places: list[Endpoint] = []
+    for endpoint in others:
+        places += map(endpoint.on_interface, beyond) if endpoint in wide else [endpoint]
+    names = loopback_interfaces()
+    return places + [endpoint.on_interface(name) for endpoint in local for name in names]
 
 
 def _is_beyond(name: str) -> bool:
@@ -445,10 +459,10 @@ def _interface_type(name: str) -> str:
 def addresses_of(host: str) -> list[str]:
     """Return the addresses of a host name or address; none if it is not known."""
     try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
-    except (OSError, ValueError):  # Zenoh's own error says what is wrong with the host
+        addresses = socket.getaddrinfo(present_loopback(host), None, type=socket.SOCK_STREAM)
+    except (OSError, ValueError):  # Zenoh's own error gives the reason
         return []
-    return list(dict.fromkeys(str(entry[4][0]) for entry in found))
+    return list(dict.fromkeys(str(entry[4][0]) for entry in addresses))
 
 
 def is_own(host: str) -> bool:

@@ -9,37 +9,42 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
+import msgspec
 import zenoh
 
-from rosz.errors import ClosedError, TransportError
-from rosz.session.at_exit import ENDING, leak_at_exit
-from rosz.session.channels import CallbackQueue, Channel
+from rosz.errors import ClosedError, PanicError, TransportError
+from rosz.names import LONGEST_KEY, check_length
+from rosz.session.at_exit import leak_at_exit, lose_sessions
+from rosz.session.channels import CallbackQueue, ItemChannel
 from rosz.session.samples import Sample
-from rosz.worker import Worker
+from rosz.worker import ENDING, Worker
 
-__all__ = (
-    "BoundedSubscriber",
-    "Callbacks",
-    "Declared",
-    "PullSubscriber",
-    "RawPublisher",
-    "translate_errors",
-)
+_PANIC = "PanicException"
+"""The class of PyO3 for panics. It is not an `Exception`, and no module has it."""
+_POISONED = "PoisonError"
+"""Name of the error by which Rust reports a lock that was held during a panic."""
 
 _log = logging.getLogger("rosz.session")
 
 
 @contextmanager
-def translate_errors(what: str) -> Iterator[None]:
-    """Turn errors of Zenoh into those of rosz.
+def translate_errors(what: str, key: str = "") -> Iterator[None]:
+    """Turn errors and panics of Zenoh into errors of rosz, and refuse keys that are too long.
+
+    A panic that leaves a lock poisoned makes every later operation fail: the sessions are lost.
 
     Args:
         what: The operation, as a verb with its object.
+        key: The object, if it is a key expression.
 
     Raises:
         ClosedError: The session is closed, or the operation was cancelled.
+        InvalidName: The key is too long.
+        PanicError: Zenoh panicked.
         TransportError: Zenoh reported another error.
     """
+    if key:
+        what = f"{what} '{check_length(key, LONGEST_KEY)}'"
     try:
         yield
     except zenoh.ZError as error:
@@ -49,14 +54,20 @@ def translate_errors(what: str) -> Iterator[None]:
         if "cancelled" in text:
             raise ClosedError(f"cannot {what}: it was cancelled") from error
         raise TransportError(f"cannot {what}: {text}") from error
+    except BaseException as error:
+        if type(error).__name__ != _PANIC:
+            raise
+        if _POISONED in str(error):
+            lose_sessions(f"cannot {what}: {error}")
+        raise PanicError(f"cannot {what}: Zenoh panicked: {error}") from error
 
 
 class Declared:
     """One declaration, which is undeclared at most once.
 
     Zenoh refuses to undeclare a declaration while a thread is inside a method of it. So `_calls`
-    has an item for each such thread, and the last of them undeclares what was closed meanwhile.
-    Nobody waits, since to append to a list and to pop from it are atomic.
+    has an item for each such thread, and the last of them undeclares a declaration that was closed
+    meanwhile. Nobody waits, since to append to a list and to pop from it are atomic.
 
     Args:
         what: The name of the declaration in error texts.
@@ -84,15 +95,7 @@ class Declared:
 
     @contextmanager
     def _call(self, doing: str) -> Iterator[None]:
-        """Return a context for calling a method of Zenoh's object.
-
-        Args:
-            doing: The operation, as a verb with its object.
-
-        Raises:
-            ClosedError: The declaration or the session is closed.
-            TransportError: Zenoh reported another error.
-        """
+        """Return a context for calling a method of Zenoh's object, which translates its errors."""
         try:
             self._calls.append(None)
             if self._closed:
@@ -122,7 +125,7 @@ class Declared:
         del entity
 
     def __del__(self) -> None:
-        """Undeclare what nobody closed."""
+        """Undeclare a declaration that nobody closed."""
         self.close()
 
 
@@ -140,14 +143,14 @@ class Callbacks(Declared):
     def __init__(
         self,
         what: str,
-        declared: tuple[Any, Channel | CallbackQueue],
+        declared: tuple[Any, ItemChannel | CallbackQueue],
         callback: Callable[[Any], None],
         begin: Callable[[], None] | None = None,
         idle: Callable[[], None] | None = None,
     ) -> None:
         entity, source = declared
         super().__init__(what, entity)
-        # What calls back must not refer to this object, else it would not be undeclared.
+        # The delivery must not refer to this object, else it would not be undeclared.
         if isinstance(source, CallbackQueue):
             delivery = _Delivery(what, source.take, callback, begin, idle)
             source.handle_with(delivery.deliver_all, at_once=bool(begin or idle))
@@ -169,50 +172,36 @@ class Callbacks(Declared):
         Worker(f"rosz {what}", lambda _: None, receive=receive, logger=_log)
 
 
-class _Delivery:
+class _Delivery(msgspec.Struct, eq=False):
     """Passes items to a callback; the arguments are those of `Callbacks`, but for ``take``.
 
     Items do not leave this package, not even as arguments: see `rosz.session.at_exit`.
-
-    Args:
-        what: The name of the declaration.
-        take: Function that returns the oldest item; None if there is none.
-        callback: Function called with each item.
-        begin: Function called once, before the first item.
-        idle: Function called each time when all items have been handled.
     """
 
-    def __init__(
-        self,
-        what: str,
-        take: Callable[[], Any],
-        callback: Callable[[Any], None],
-        begin: Callable[[], None] | None,
-        idle: Callable[[], None] | None,
-    ) -> None:
-        self._what = what
-        self._take = take
-        self._callback = callback
-        self._first = begin
-        self._idle = idle
+    what: str
+    take: Callable[[], Any]
+    callback: Callable[[Any], None]
+    begin: Callable[[], None] | None
+    idle: Callable[[], None] | None
 
     def deliver(self, item: Any) -> None:
         """Pass an item to the callback."""
         try:
-            self._callback(item)
+            self.callback(item)
         except Exception:  # noqa: BLE001  # the callback boundary: the next item may succeed
-            _log.exception("the callback of the %s failed", self._what)
+            if not ENDING.is_set():
+                _log.exception("the callback of the %s failed", self.what)
 
     def deliver_all(self) -> None:
         """Pass all items that are there."""
-        first, self._first = self._first, None
-        if first is not None:
-            first()
-        while (item := self._take()) is not None:
+        begin, self.begin = self.begin, None
+        if begin is not None:
+            begin()
+        while (item := self.take()) is not None:
             self.deliver(item)
             del item
-        if self._idle is not None:
-            self._idle()
+        if self.idle is not None:
+            self.idle()
 
 
 class PullSubscriber(Declared):
@@ -250,8 +239,8 @@ class BoundedSubscriber(PullSubscriber):
     """A subscriber whose number of samples that wait falls with their size.
 
     The channels of Zenoh have a fixed number of places. Where that has to fall, a subscriber with
-    a smaller channel takes the place of the one before. What waits there is received first, and
-    what both have got is received once.
+    a smaller channel takes the place of the one before. The samples of the latter are
+    received first, and those that both have are received once.
 
     Args:
         key: The key expression.
@@ -272,11 +261,7 @@ class BoundedSubscriber(PullSubscriber):
         self._doubtful = 0  # how many samples may still be repeated ones
 
     def receive(self) -> Sample:
-        """Wait for a sample and return the oldest one.
-
-        Raises:
-            ClosedError: The subscriber or the session was closed.
-        """
+        """Wait for a sample and return the oldest one."""
         while True:
             if self._waiting:
                 return self._waiting.popleft()
@@ -296,8 +281,8 @@ class BoundedSubscriber(PullSubscriber):
             self._depth = depth
             self._entities.append(self._declare(depth))
             before = self._repeated if self._doubtful else set()
-            waiting = [one for one in self.take() if one.attachment not in before]
-            self._repeated = before | {one.attachment for one in waiting} - {None}
+            waiting = [sample for sample in self.take() if sample.attachment not in before]
+            self._repeated = before | {sample.attachment for sample in waiting} - {None}
             self._doubtful = depth + len(self._repeated)
             self._waiting = deque(waiting, depth)
             old, new = self._entities
@@ -334,9 +319,11 @@ class RawPublisher(Declared):
         try:  # as in `_call`, without the time that entering a context takes
             self._calls.append(None)
             if self._closed:
-                raise ClosedError(f"cannot publish on '{self.key}': the publisher is closed")
+                raise ClosedError(  # noqa: TRY301
+                    f"cannot publish on '{self.key}': the publisher is closed"
+                )
             self._put(payload, attachment=attachment)
-        except zenoh.ZError:
+        except BaseException:
             with translate_errors(f"publish on '{self.key}'"):
                 raise
         finally:
@@ -386,7 +373,7 @@ class RawPublisher(Declared):
         return self._matched
 
     def _watch(self) -> Callable[[], Any]:
-        """Begin to follow whether there are subscribers; return what tells of a change."""
+        """Begin to follow whether there are subscribers; return the source of changes."""
         with self._watching, self._call(f"look for subscribers of '{self.key}'"):
             if self._changes is None:
                 listener = self._entity.declare_matching_listener(zenoh.handlers.RingChannel(1))

@@ -11,29 +11,24 @@ import logging
 import socket
 import threading
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from rosz.errors import RoszError
+from rosz.lifecycle import Closable
 from rosz.session.config import SessionConfig, addresses_of, is_own
 from rosz.session.mesh import links_key
 from rosz.session.opening import places_of, why_refused_by_keys
-from rosz.session.probe import why_refused
+from rosz.session.probe import SILENT, why_refused
+from rosz.session.queries import Query
 from rosz.session.session import Session
 from rosz.wire import Endpoint
-
-if TYPE_CHECKING:
-    from rosz.lifecycle import Closable
-    from rosz.session.queries import Query
-
-__all__ = ("Dialling", "Waiting", "find_waiting", "linked_session", "who_answers")
 
 _PAUSE = 1.0
 """Seconds between two looks at the links."""
 _FIRST_LOOK = 2.0
-_GREETING = 1.0
-_GREET_EVERY = 10
+_IDENTIFY_TIMEOUT = 1.0
+_IDENTIFY_EVERY = 10
 """Number of looks from one attempt to the next to find out who answers at an endpoint."""
 
 _log = logging.getLogger("rosz.session")
@@ -93,9 +88,9 @@ class Dialling:
     def _reply(self, query: Query) -> None:
         host = socket.gethostname()
         self._looked.wait(_FIRST_LOOK)
-        found = [Waiting(host, endpoint) for endpoint, yes in self._reached.items() if not yes]
+        waiting = [Waiting(host, endpoint) for endpoint, yes in self._reached.items() if not yes]
         with query:
-            query.reply(links_key(self._session.zid, "waiting"), msgspec.msgpack.encode(found))
+            query.reply(links_key(self._session.zid, "waiting"), msgspec.msgpack.encode(waiting))
 
     def _run(self) -> None:
         try:
@@ -113,21 +108,23 @@ class Dialling:
         look = 0
         while dialled and not self._closing.is_set():
             links = self._session.links()
-            greet = look % _GREET_EVERY == 1
-            found = {one: self._is_reached(one, links, greet=greet) for one in dialled}
-            self._reached = found
+            identify = look % _IDENTIFY_EVERY == 1
+            self._reached = {
+                text: self._is_reached(text, links, identify=identify) for text in dialled
+            }
             self._looked.set()
-            for endpoint, reached in found.items():
+            for endpoint, reached in self._reached.items():
                 # A link may take some time to come about.
-                if look == 1 and self._logged.get(endpoint) is reached is False:
-                    self._log_refusal(endpoint)
+                refused = look == 1 and self._logged.get(endpoint) is reached is False
+                if refused and (reason := self._why_refused_by_keys(endpoint)):
+                    _log.warning("no link to %s: %s", endpoint, reason)
                 if reached or look:
                     self._log_change(endpoint, self._logged.get(endpoint), reached)
                     self._logged[endpoint] = reached
             look += 1
             self._closing.wait(_PAUSE)
 
-    def _is_reached(self, endpoint: str, links: dict[str, list[str]], *, greet: bool) -> bool:
+    def _is_reached(self, endpoint: str, links: dict[str, list[str]], *, identify: bool) -> bool:
         """Tell whether there is a link to the session that answers at an endpoint.
 
         It may be a link by another address, since Zenoh opens no further one to the same session.
@@ -139,8 +136,8 @@ class Dialling:
         if zid := linked_session(endpoint, links):
             self._answering[endpoint] = zid
             return True
-        if greet and not self._closing.is_set():
-            self._answering[endpoint] = who_answers(endpoint, self._config, _GREETING)
+        if identify and not self._closing.is_set():
+            self._answering[endpoint] = who_answers(endpoint, self._config, _IDENTIFY_TIMEOUT)
         return self._answering.get(endpoint) in links
 
     def _log_change(self, endpoint: str, before: bool | None, now: bool) -> None:
@@ -152,12 +149,7 @@ class Dialling:
             _log.warning("the link to %s is lost: waiting for it", endpoint)
         else:
             reason = self._why_refused_by_keys(endpoint) or why_refused(endpoint)
-            _log.warning("waiting for %s: %s", endpoint, reason or "it opens no link")
-
-    def _log_refusal(self, endpoint: str) -> None:
-        """Log why an endpoint refuses links, if waiting will not help."""
-        if reason := self._why_refused_by_keys(endpoint):
-            _log.warning("no link to %s: %s", endpoint, reason)
+            _log.warning("waiting for %s: %s", endpoint, reason or SILENT)
 
     def _why_refused_by_keys(self, endpoint: str) -> str:
         return why_refused_by_keys(Endpoint(endpoint), self._config.keys)
@@ -180,22 +172,22 @@ def linked_session(endpoint: str, links: dict[str, list[str]]) -> str:
 
 
 def find_waiting(session: Session, timeout: float, *, everywhere: bool = False) -> list[Waiting]:
-    """Return what cores and nodes dial and do not reach.
+    """Return the endpoints that cores and nodes dial and do not reach.
 
     Args:
         session: The session to query with.
         timeout: Time limit in seconds.
         everywhere: Whether to query all machines rather than this one.
     """
-    found: set[Waiting] = set()
+    waiting: set[Waiting] = set()
     key = links_key("*", "waiting", machine="*" if everywhere else "")
     for reply in session.get(key, timeout=timeout):
         if reply.ok:
             try:
-                found.update(msgspec.msgpack.decode(reply.payload, type=list[Waiting]))
+                waiting.update(msgspec.msgpack.decode(reply.payload, type=list[Waiting]))
             except msgspec.DecodeError as error:
                 _log.warning("no list of endpoints from '%.100s': %s", reply.key, error)
-    return sorted(found)
+    return sorted(waiting)
 
 
 def who_answers(endpoint: str, config: SessionConfig, timeout: float) -> str:
@@ -229,9 +221,9 @@ def _beyond(config: SessionConfig) -> Iterator[str]:
     for text in connect:
         endpoint = Endpoint(text)
         same = any(
-            endpoint.address == one.address
-            or (one.port and one.port == endpoint.port and is_own(endpoint.host))
-            for one in own
+            endpoint.address == place.address
+            or (place.port and place.port == endpoint.port and is_own(endpoint.host))
+            for place in own
         )
         if not same:
             yield text

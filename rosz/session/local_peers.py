@@ -1,4 +1,4 @@
-"""The other sessions of this machine, and what Linux says about their processes.
+"""The other sessions of this machine, and the states of their processes on Linux.
 
 A process that finds nobody at the rendezvous may be the first one. But the process that held the
 rendezvous may also have just died, before its peers could find the newcomer, or it may be stopped,
@@ -31,24 +31,8 @@ from zlib import crc32
 import msgspec
 
 from rosz.errors import TransportError
-from rosz.session.probe import is_listening
+from rosz.session.probe import is_listening, present_loopback
 from rosz.wire import Endpoint
-
-__all__ = (
-    "CoreLock",
-    "LocalPeer",
-    "LocalPeers",
-    "LocalRegistration",
-    "describe_process",
-    "direct_endpoint",
-    "find_holder",
-    "find_listener",
-    "how_to_resume",
-    "is_private",
-    "is_stopped",
-    "pid_of_peer",
-    "tcp_ports",
-)
 
 _LOOPBACK = "127.0.0.1"
 _MAX_PORT = 65535
@@ -104,7 +88,7 @@ def direct_endpoint(rendezvous: str, peer: LocalPeer | None) -> str:
     port = peer.port if peer is not None else 0
     if is_private(rendezvous):
         return f"{rendezvous}.{port or _private_number():x}"
-    return f"tcp/{_LOOPBACK}:{port}" if port else ""
+    return str(Endpoint.of("tcp", present_loopback(_LOOPBACK), port)) if port else ""
 
 
 def _private_number() -> int:
@@ -137,18 +121,18 @@ class LocalPeers:
             lines = (_PROC / "net/unix").read_text(errors="replace").splitlines()
         except OSError:  # not Linux
             lines = []
-        found: dict[tuple[str, int, int], LocalPeer] = {}
+        peers: dict[tuple[str, int, int], LocalPeer] = {}
         for line in lines:
             _, is_ours, rest = line.partition(prefix)
             parts = rest.split("/")
             if is_ours and len(parts) == _FIELDS and parts[1].isdecimal() and parts[2].isdecimal():
                 peer = LocalPeer(parts[0], int(parts[1]), int(parts[2]), parts[3])
                 key = (peer.namespace, peer.pid, peer.port)
-                if key not in found or peer.zid:
-                    found[key] = peer
+                if key not in peers or peer.zid:
+                    peers[key] = peer
         if own is not None:
-            found.pop((own.namespace, own.pid, own.port), None)
-        return cls(rendezvous, tuple(found.values()))
+            peers.pop((own.namespace, own.pid, own.port), None)
+        return cls(rendezvous, tuple(peers.values()))
 
     def __iter__(self) -> Iterator[LocalPeer]:
         """Iterate over the sessions."""
@@ -243,10 +227,11 @@ class LocalRegistration:
         if reachable and is_private(rendezvous):
             self.peer = msgspec.structs.replace(self.peer, port=_private_number())
         elif reachable:
-            self._reserved = socket.socket()
+            host = present_loopback(_LOOPBACK)
+            self._reserved = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
             # Two sockets with this option may have one port, as long as only one of them listens.
             self._reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._reserved.bind((_LOOPBACK, 0))
+            self._reserved.bind((host, 0))
             port = self._reserved.getsockname()[1]
             self.peer = msgspec.structs.replace(self.peer, port=port)
         self._bind()
@@ -261,9 +246,9 @@ class LocalRegistration:
 
     def close(self) -> None:
         """Remove the registration; a second call has no effect."""
-        for one in (self._reserved, *self._sockets):
-            if one is not None:
-                one.close()
+        for socket_ in (self._reserved, *self._sockets):
+            if socket_ is not None:
+                socket_.close()
 
     def _bind(self) -> None:
         made = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -418,7 +403,7 @@ def _tcp_sockets() -> Iterator[tuple[str, int, str]]:
 
 
 def _open_files(pid: int) -> Iterator[str]:
-    """Yield what the open files of a process link to, as far as they may be read."""
+    """Yield the targets of the open files of a process, as far as they may be read."""
     try:
         files = list((_PROC / str(pid) / "fd").iterdir())
     except OSError:

@@ -1,10 +1,10 @@
 """Finding out when a new session is linked to all its neighbours.
 
 A peer hears of other peers from the first one that it meets, and connects to them in the
-background. Until it has done so, what it publishes does not reach those that it is not linked to.
-So it asks the sessions that it meets for *their* links, and is ready once it has all of these
-itself. Sessions on other machines are left out, because routers carry what it publishes to them and
-it cannot connect to them; so are those that are stopped, which answer nothing until they resume.
+background. Until it has done so, its samples do not reach those that it is not linked to. So it
+asks the sessions that it meets for *their* links, and is ready once it has all of these itself.
+Sessions on other machines are left out, because routers carry its samples to them and it cannot
+connect to them; so are those that are stopped, which answer nothing until they resume.
 """
 
 from __future__ import annotations
@@ -16,18 +16,13 @@ import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from rosz.errors import RoszError
-
-if TYPE_CHECKING:
-    from rosz.lifecycle import Closable
-    from rosz.session.queries import Query
-    from rosz.session.session import Session
-
-__all__ = ("MeshReadiness", "links_key", "machine_id", "serve_links")
+from rosz.lifecycle import Closable
+from rosz.session.queries import Query
+from rosz.session.session import Session
 
 _SPACE = "@rosz/links"
 _POLL_SECONDS = 0.002
@@ -116,13 +111,13 @@ class MeshReadiness:
         missing: set[str] = set()
         pause = _POLL_SECONDS
         while not self._stop.wait(pause):
-            found = self._session.peers()
+            now_linked = self._session.peers()
             now = time.monotonic()
-            if found != peers:
-                peers, latest = found, now
-            missing = self._missing(_QUERY_TIMEOUT) if found and self._mesh else set()
-            if found and not missing:
-                self._warn_of_many(len(found))
+            if now_linked != peers:
+                peers, latest = now_linked, now
+            missing = self._missing(_QUERY_TIMEOUT) if now_linked and self._mesh else set()
+            if now_linked and not missing:
+                self._warn_of_many(len(now_linked))
                 return
             if now - began >= self._timeout:
                 self.ready.set()
@@ -149,14 +144,14 @@ class MeshReadiness:
 
     def _missing(self, timeout: float) -> set[str]:
         """Return the sessions that neighbours are linked to, and that this one is not yet."""
-        found: set[str] = set()
+        linked: set[str] = set()
         for reply in self._session.get(self._key, timeout=min(timeout, _QUERY_TIMEOUT)):
             if reply.ok:
                 try:
-                    found.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
+                    linked.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
                 except msgspec.DecodeError as error:
                     _log.warning("no list of links from '%.100s': %s", reply.key, error)
-        missing = found - {self._session.zid, *self._session.peers()}
+        missing = linked - {self._session.zid, *self._session.peers()}
         return missing - self._session.out_of_reach() if missing else missing
 
 
@@ -165,7 +160,7 @@ def links_key(zid: str, *chunks: str, machine: str = "") -> str:
 
     Args:
         zid: The id of the session; ``*`` for all.
-        chunks: What the query is about; all links when not given.
+        chunks: The subject of the query; all links when not given.
         machine: The id of its machine; this one when not given, ``*`` for all.
     """
     return "/".join((_SPACE, machine or machine_id(), zid, *chunks))

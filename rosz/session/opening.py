@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +17,9 @@ import zenoh
 from rosz.errors import TransportError
 from rosz.interrupts import raise_deferred
 from rosz.session.config import (
-    EPHEMERAL,
     SessionConfig,
     connect_endpoint,
+    ephemeral,
     insert_setting,
     loopback_interfaces,
     new_id,
@@ -27,7 +29,7 @@ from rosz.session.config import (
 )
 from rosz.session.declared import translate_errors
 from rosz.session.local_peers import LocalPeer, LocalPeers, direct_endpoint, is_private
-from rosz.session.probe import first_listening, is_listening, why_refused
+from rosz.session.probe import SILENT, first_listening, is_listening, why_refused
 from rosz.session.zenoh_workarounds import (
     SEGMENTS,
     connect_to_running,
@@ -36,6 +38,7 @@ from rosz.session.zenoh_workarounds import (
     reachable_config,
     remove_abandoned_segments,
     remove_abandoned_sockets,
+    search_seconds,
 )
 from rosz.wire import Endpoint
 from rosz.worker import start_thread
@@ -43,15 +46,15 @@ from rosz.worker import start_thread
 if TYPE_CHECKING:
     from rosz.security import KeyFolder
 
-__all__ = ("open_raw", "outlasted_silence", "places_of", "settings_text", "why_refused_by_keys")
-
 _NOBODY = "Unable to connect to any of"
 _NO_SEGMENT = "Unable to create POSIX shm segment"
 _BUSY_TIMEOUT = 60.0
 """Time limit in seconds of each attempt of a node at a busy router. To give up earlier would have
 the router begin anew."""
 _SLOW_SECONDS = 8.0
-"""Seconds after which a node says what it waits for."""
+"""Seconds after which a node logs the reason of its wait."""
+_NAMED_SECONDS = 1.0
+"""Seconds after which a command says what it waits for; to find out why takes another one."""
 _ATTEMPT_SECONDS = 2.0
 """Time limit of each attempt of a node that waits for other machines."""
 _LOOK_SECONDS = 0.5
@@ -84,6 +87,10 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         UsageError: The override text is malformed.
     """
     waits = config.mode == "client" and config.hold_rendezvous and not config.must_connect
+    if not waits and config.mode == "client" and config.connect:
+        reasons = partial(_reasons, config)
+        with _reporting(" or ".join(config.connect), _NAMED_SECONDS, reasons):
+            return _open_once(config, peers, own)
     if not waits:
         return _open_once(config, peers, own)
     if not config.connect:
@@ -96,8 +103,7 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
             raw = _open_once(config, peers, own)
         except _Unanswered:
             if not waited:
-                reasons = "; ".join(_refused_links(config))
-                _log.warning("waiting for %s: %s", others, reasons or "nobody answers")
+                _log.warning("waiting for %s: %s", others, _reasons(config))
             waited = True
             raise_deferred()
             while not first_listening(config.endpoints, _LOOK_SECONDS):
@@ -109,20 +115,34 @@ def open_raw(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None = N
         return raw
 
 
-def _open_at_router(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) -> Any:
-    """Open the session of a node whose router may be busy, as when many nodes start at once."""
+def _reasons(config: SessionConfig) -> str:
+    return "; ".join(_refused_links(config)) or "nobody answers"
+
+
+@contextmanager
+def _reporting(place: str, seconds: float, reason: Callable[[], str]) -> Iterator[threading.Event]:
+    """Log the reason if a block takes longer; the block gets an event that is set then."""
     over = threading.Event()
     reported = threading.Event()
 
     def report() -> None:
-        if over.wait(_SLOW_SECONDS):
-            return
-        reason = why_refused(config.rendezvous)
-        reported.set()
-        _log.warning("waiting for %s: %s", config.rendezvous, reason or _BUSY)
+        if not over.wait(seconds):
+            text = reason()
+            if not over.is_set():
+                reported.set()
+                _log.warning("waiting for %s: %s", place, text)
 
     start_thread(threading.Thread(target=report, name="rosz-waiting", daemon=True))
     try:
+        yield reported
+    finally:
+        over.set()
+
+
+def _open_at_router(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) -> Any:
+    """Open the session of a node whose router may be busy, as when many nodes start at once."""
+    place = config.rendezvous
+    with _reporting(place, _SLOW_SECONDS, lambda: why_refused(place) or _BUSY) as reported:
         while True:
             try:
                 raw = _open_once(config, peers, own)
@@ -135,8 +155,6 @@ def _open_at_router(config: SessionConfig, peers: LocalPeers, own: LocalPeer | N
             if reported.is_set():
                 _log.warning("connected to %s", config.rendezvous)
             return raw
-    finally:
-        over.set()
 
 
 def _open_once(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) -> Any:
@@ -145,7 +163,7 @@ def _open_once(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) 
         config = msgspec.structs.replace(config, open_timeout=longer)
     reachable = reachable_config(config, peers)
     if reachable is None:
-        raise _nobody(config)
+        raise _nobody(config, search_seconds(config, peers))
     config = reachable
     if config.shared_memory and SEGMENTS.exists() and not os.access(SEGMENTS, os.W_OK):
         _log.warning("no shared memory: %s cannot be written to; samples go over links", SEGMENTS)
@@ -159,17 +177,14 @@ def _open_once(config: SessionConfig, peers: LocalPeers, own: LocalPeer | None) 
         # Zenoh decides which links this machine accepts, and its log says which it refuses.
         zenoh.init_log_from_env_or("zenoh_link_tls=warn")
     try:
-        with translate_errors(f"open a session ({_quoted(config)})"), prepare_process(config.mode):
-            if config.mode == "peer" and config.hold_rendezvous:
-                return open_and_listen(settings, config.rendezvous, lambda: _open(settings, config))
-            return _open(settings, config)
+        return _open_and_listen(settings, config)
     except TransportError as error:
         if config.shared_memory and _NO_SEGMENT in str(error):
             _log.warning("no shared memory: %s is full; samples go over links", SEGMENTS)
             return _open_once(msgspec.structs.replace(config, shared_memory=0), peers, own)
         if _NOBODY not in str(error):
             raise
-        raise _nobody(config) from error
+        raise _nobody(config, config.open_timeout) from error
 
 
 def _listen_directly(settings: zenoh.Config, rendezvous: str, own: LocalPeer | None) -> None:
@@ -180,8 +195,8 @@ def _listen_directly(settings: zenoh.Config, rendezvous: str, own: LocalPeer | N
     if is_private(rendezvous):
         remove_abandoned_sockets(rendezvous)
     listen = read_setting(settings, "listen/endpoints")
-    if EPHEMERAL in listen and (direct := direct_endpoint(rendezvous, own)):
-        listen[listen.index(EPHEMERAL)] = direct
+    if ephemeral() in listen and (direct := direct_endpoint(rendezvous, own)):
+        listen[listen.index(ephemeral())] = direct
         insert_setting(settings, "listen/endpoints", listen)
 
 
@@ -193,13 +208,15 @@ def places_of(config: SessionConfig) -> tuple[tuple[str, ...], tuple[str, ...]]:
         UsageError: The override text is malformed, or a protocol cannot use keys.
     """
     settings = _settings(config)
-    found = [read_setting(settings, f"{way}/endpoints") for way in ("listen", "connect")]
-    listen, connect = (
+
+    def places(way: str) -> tuple[str, ...]:
+        endpoints = read_setting(settings, f"{way}/endpoints")
         # A configuration file may list them by mode.
-        tuple((endpoints.get(config.mode) if isinstance(endpoints, dict) else endpoints) or ())
-        for endpoints in found
-    )
-    return listen, connect
+        return tuple(
+            (endpoints.get(config.mode) if isinstance(endpoints, dict) else endpoints) or ()
+        )
+
+    return places("listen"), places("connect")
 
 
 def outlasted_silence(config: SessionConfig) -> float:
@@ -229,8 +246,15 @@ def settings_text(config: SessionConfig) -> str:
 def _given(value: Any) -> Any:
     """Return a value of JSON without the members that are null."""
     if isinstance(value, dict):
-        return {key: _given(one) for key, one in value.items() if one is not None}
+        return {key: _given(item) for key, item in value.items() if item is not None}
     return value
+
+
+def _open_and_listen(settings: zenoh.Config, config: SessionConfig) -> Any:
+    with translate_errors(f"open a session ({_quoted(config)})"), prepare_process(config.mode):
+        if config.mode == "peer" and config.hold_rendezvous:
+            return open_and_listen(settings, config.rendezvous, lambda: _open(settings, config))
+        return _open(settings, config)
 
 
 def _open(settings: zenoh.Config, config: SessionConfig) -> Any:
@@ -271,10 +295,10 @@ def _tls(keys: KeyFolder) -> dict[str, Any]:
     }
 
 
-def _nobody(config: SessionConfig) -> _Unanswered:
+def _nobody(config: SessionConfig, seconds: float) -> _Unanswered:
     reasons = "".join(f"; no link to {reason}" for reason in _refused_links(config))
     return _Unanswered(
-        f"nobody answers at {_quoted(config)} within {config.open_timeout:g} s{reasons}: start"
+        f"nobody answers at {_quoted(config)} within {seconds:g} s{reasons}: start"
         " 'rosz core', a launch or a node there first, or name another place in ROSZ_RENDEZVOUS"
     )
 
@@ -294,7 +318,7 @@ def why_refused_by_keys(endpoint: Endpoint, keys: KeyFolder | None) -> str:
     """
     if endpoint.is_local or not endpoint.is_tcp:
         return ""
-    from rosz.security.handshake import refusal, wants_keys
+    from rosz.security import refusal, wants_keys
 
     if keys is not None:
         return refusal(endpoint, keys)
@@ -304,8 +328,15 @@ def why_refused_by_keys(endpoint: Endpoint, keys: KeyFolder | None) -> str:
 
 
 def _refused_links(config: SessionConfig) -> Iterator[str]:
-    """Yield the endpoints that refuse links because of missing or wrong keys, with the reason."""
+    """Yield the endpoints that nobody answers at, with the reason.
+
+    Of a rendezvous where nobody listens nothing is said, as that is how the first process finds it.
+    """
     for text in dict.fromkeys((config.rendezvous, *config.connect)):
         endpoint = Endpoint(text if config.keys is None else connect_endpoint(text))
-        if reason := why_refused_by_keys(endpoint, config.keys):
-            yield f"'{endpoint}': {reason}"
+        reason = why_refused(str(endpoint))
+        if not reason:
+            reason = why_refused_by_keys(endpoint, config.keys) or SILENT
+        elif text not in config.connect:
+            continue
+        yield f"'{endpoint}': {reason}"

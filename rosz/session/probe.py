@@ -1,30 +1,30 @@
-"""Finding out whether somebody listens at an endpoint, without Zenoh."""
+"""Checking whether a program listens at an endpoint, without Zenoh."""
 
 from __future__ import annotations
 
 import socket
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import takewhile
 
 from rosz.wire import Endpoint
-
-__all__ = ("first_listening", "is_listening", "why_refused")
 
 _TIMEOUT = 0.5
 _AGAIN_SECONDS = 0.1
 _LONGEST_PAUSE = 1.0
 _GRACE_SECONDS = 0.3
-"""Seconds that a less preferred endpoint waits for the result of a more preferred one."""
+"""Seconds for which an answer waits for the results of more preferred endpoints."""
+SILENT = "it accepts connections and says nothing: it hangs, is busy, or is not Zenoh"
 
 
 def first_listening(endpoints: Sequence[str], timeout: float) -> str:
-    """Return the first of some endpoints where somebody accepts connections; empty for none.
+    """Return the first endpoint that accepts connections; empty for none.
 
-    All are tried at once, so that one that cannot be reached does not delay the others for long.
+    All endpoints are tried at once, so that an unreachable one hardly delays the others.
 
     Args:
-        endpoints: The endpoints, the most preferred one first.
+        endpoints: The endpoints, the most preferred first.
         timeout: Time limit in seconds.
     """
     answers: dict[str, bool] = {}
@@ -44,9 +44,9 @@ def first_listening(endpoints: Sequence[str], timeout: float) -> str:
             pause = min(1.2 * pause, _LONGEST_PAUSE)
 
     def preferred() -> bool:
-        """Tell whether an endpoint answered, and all that are preferred to it have been tried."""
-        known = list(takewhile(answers.__contains__, endpoints))
-        return any(answers[endpoint] for endpoint in known)
+        """Return whether an endpoint accepted, and all more preferred ones have been tried."""
+        tried = takewhile(answers.__contains__, endpoints)
+        return any(answers[endpoint] for endpoint in tried)
 
     for endpoint in endpoints:
         name = f"rosz-probe {endpoint}"
@@ -59,21 +59,32 @@ def first_listening(endpoints: Sequence[str], timeout: float) -> str:
 
 
 def is_listening(endpoint: str, timeout: float = _TIMEOUT) -> bool:
-    """Tell whether somebody accepts connections at a Zenoh endpoint.
+    """Return whether a Zenoh endpoint accepts connections.
 
     Args:
-        endpoint: The endpoint; for a protocol without connections the result is true.
+        endpoint: The endpoint; the result is true for a protocol that cannot be checked.
         timeout: Time limit in seconds.
     """
     return not why_refused(endpoint, timeout)
 
 
+def present_loopback(host: str) -> str:
+    """Return ``::1`` for an IPv4 loopback that this machine does not have; else the host itself."""
+    if host not in {"localhost", "127.0.0.1"}:
+        return host
+    for family, address in ((socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1")):
+        with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.bind((address, 0))
+            return host if family is socket.AF_INET else address
+    return host
+
+
 def why_refused(endpoint: str, timeout: float = _TIMEOUT) -> str:
-    """Return why nobody can connect to an endpoint; empty if one can, or if that is unknown.
+    """Return why a connection to an endpoint fails; empty if it succeeds or cannot be checked.
 
     Args:
         endpoint: The endpoint.
-        timeout: Time limit for each of its addresses, in seconds.
+        timeout: Time limit in seconds for each address of the host.
     """
     place = Endpoint(endpoint)
     if place.is_unix:
@@ -83,11 +94,12 @@ def why_refused(endpoint: str, timeout: float = _TIMEOUT) -> str:
     if place.port is None:
         return f"'{endpoint}' has no port"
     try:
-        found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)
+        host = present_loopback(place.host)
+        entries = socket.getaddrinfo(host, place.port, type=socket.SOCK_STREAM)
     except (OSError, ValueError) as error:
         return f"the name '{place.host}' is not known: {getattr(error, 'strerror', error)}"
     reasons = []
-    for family, _, _, _, address in found:
+    for family, _, _, _, address in entries:
         if not (reason := _connect(family, address, timeout)):
             return ""
         reasons.append(reason)
@@ -95,7 +107,7 @@ def why_refused(endpoint: str, timeout: float = _TIMEOUT) -> str:
 
 
 def _connect(family: int, address: object, timeout: float) -> str:
-    """Return why a connection fails; empty if it succeeds."""
+    """Return why a connection to an address fails; empty if it succeeds."""
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.settimeout(timeout)
         try:

@@ -4,32 +4,19 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from types import SimpleNamespace
-from typing import Any, Final, Literal, Self, TypedDict
+from typing import Any, Final, Literal, TypedDict
 
 import zenoh
 
-from rosz.errors import TransportError, UsageError
-from rosz.session.at_exit import ENDING, ClosedSession, leak_at_exit
-from rosz.session.channels import Channel, open_channel
-from rosz.session.declared import Declared
-from rosz.session.samples import Sample, Stamp, to_timestamp
-
-__all__ = (
-    "LONGEST_WAIT",
-    "PRIORITIES",
-    "TARGETS",
-    "Cancellation",
-    "Priority",
-    "Querier",
-    "Query",
-    "QueryOptions",
-    "Queryable",
-    "Replies",
-    "Reply",
-    "Target",
-    "clamp_timeout",
-)
+from rosz.errors import ClosedError, TransportError, UsageError
+from rosz.lifecycle import Closing
+from rosz.session.at_exit import ClosedSession, leak_at_exit
+from rosz.session.channels import ItemChannel, open_channel
+from rosz.session.declared import Declared, translate_errors
+from rosz.session.samples import RawItem, Sample, Stamp, to_timestamp
+from rosz.worker import ENDING
 
 Target = Literal["all", "all_complete", "best"]
 """Queryables that get a query: all, those declared complete, or the best one of these."""
@@ -68,7 +55,19 @@ def clamp_timeout(timeout: float) -> float:
 
 
 class QueryOptions(TypedDict, total=False):
-    """Options of a query; see `Session.query`."""
+    """Options of a query.
+
+    Attributes:
+        payload: The payload of the query.
+        attachment: The bytes to send beside the payload.
+        parameters: The part of the selector after the ``?``.
+        target: Queryables that get the query; all by default.
+        any_key: Whether replies may be for keys that the query does not match.
+        priority: Whether the query and its replies overtake samples that wait for a slow link
+            (``urgent``), or let them pass (``background``).
+        cancel: The cancellation that can end the query early; one that was cancelled before makes
+            the query raise `ClosedError`.
+    """
 
     payload: bytes | None
     attachment: bytes | None
@@ -164,18 +163,15 @@ class Querier(Declared):
         return Replies(handler)
 
 
-class Query:
+def is_key_in(expression: str, key: str) -> bool:
+    """Tell whether a Zenoh key expression includes a key."""
+    return bool(zenoh.KeyExpr(expression).includes(zenoh.KeyExpr(key)))
+
+
+class Query(RawItem, Closing):
     """One query that arrived; close it after the last reply, else the querier waits for more."""
 
-    __slots__ = ("_raw",)
-
-    def __init__(self, raw: zenoh.Query) -> None:
-        self._raw: Any = raw
-
-    @property
-    def key(self) -> str:
-        """The key expression that is queried."""
-        return str(self._raw.key_expr)
+    __slots__ = ()
 
     @property
     def parameters(self) -> str:
@@ -186,12 +182,6 @@ class Query:
     def payload(self) -> bytes | None:
         """The payload of the query."""
         raw = self._raw.payload
-        return None if raw is None else raw.to_bytes()
-
-    @property
-    def attachment(self) -> bytes | None:
-        """The bytes sent beside the payload."""
-        raw = self._raw.attachment
         return None if raw is None else raw.to_bytes()
 
     def reply(
@@ -207,11 +197,8 @@ class Query:
         Raises:
             TransportError: The session is closed, or the program is about to end.
         """
-        _check_not_ending()
-        try:
+        with _replying("reply on", key):
             self._raw.reply(key, payload, attachment=attachment, timestamp=to_timestamp(stamp))
-        except zenoh.ZError as error:
-            raise TransportError(f"cannot reply on '{key}': {error}") from error
 
     def forward(
         self,
@@ -231,15 +218,12 @@ class Query:
         Raises:
             TransportError: The session is closed, or the program is about to end.
         """
-        _check_not_ending()
         content = reply.raw.payload if payload is None else payload
-        try:
+        with _replying("reply on", key):
             if reply.ok:
                 self._raw.reply(key, content, attachment=attachment, timestamp=reply.raw.timestamp)
             else:
                 self._raw.reply_err(content)
-        except zenoh.ZError as error:
-            raise TransportError(f"cannot reply on '{key}': {error}") from error
 
     def reply_error(self, text: str) -> None:
         """Send an error as the reply.
@@ -247,11 +231,8 @@ class Query:
         Raises:
             TransportError: The session is closed, or the program is about to end.
         """
-        _check_not_ending()
-        try:
+        with _replying("reply"):
             self._raw.reply_err(text.encode())
-        except zenoh.ZError as error:
-            raise TransportError(f"cannot reply: {error}") from error
 
     def close(self) -> None:
         """Tell the querier that there are no more replies; a second call has no effect."""
@@ -268,17 +249,11 @@ class Query:
         """Close a query that nobody closed."""
         self.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 class Queryable(Declared):
     """A declared queryable that keeps its queries until a thread receives them."""
 
-    def __init__(self, key: str, entity: Any, channel: Channel) -> None:
+    def __init__(self, key: str, entity: Any, channel: ItemChannel) -> None:
         super().__init__(f"queryable '{key}'", entity)
         self._recv = channel.recv
 
@@ -296,6 +271,12 @@ class Queryable(Declared):
             return None
 
 
-def _check_not_ending() -> None:
+@contextmanager
+def _replying(what: str, key: str = "") -> Iterator[None]:
     if ENDING.is_set():
         raise TransportError("cannot reply: the program ends")
+    try:
+        with translate_errors(what, key):
+            yield
+    except ClosedError as error:
+        raise TransportError(str(error)) from error

@@ -1,7 +1,7 @@
-"""Starting this program afresh in its own process, with what it must not lose.
+"""Starting this program afresh in its own process, with the state that it must not lose.
 
 The program is executed anew with the same arguments, process id, terminal and working directory.
-Everything else ends as if the process were killed: its threads, and its links. What it hands over
+Everything else ends as if the process were killed: its threads, and its links. The state
 waits in a file without a name, whose descriptor the new program finds in its environment.
 """
 
@@ -15,8 +15,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Final, NoReturn
 
-__all__ = ("restart_program", "take_handover")
-
 _VARIABLE: Final = "_ROSZ_HANDOVER"
 _STANDARD_OUTPUT: Final = 1
 _STANDARD_ERROR: Final = 2
@@ -27,7 +25,7 @@ def restart_program(handover: bytes) -> NoReturn:
     """Execute this program anew.
 
     Args:
-        handover: What `take_handover` returns there.
+        handover: The state, which `take_handover` returns there.
 
     Raises:
         OSError: The program cannot be executed any more; nothing has changed then.
@@ -55,14 +53,14 @@ def _inherit_only(number: int) -> None:
 
     Zenoh opens the lock of a unix socket so that it would be inherited, and held for ever.
     """
-    for one in [int(file.name) for file in _OPEN_FILES.iterdir()]:
-        if one > _STANDARD_ERROR:
+    for descriptor in [int(file.name) for file in _OPEN_FILES.iterdir()]:
+        if descriptor > _STANDARD_ERROR:
             with suppress(OSError):  # the folder itself, or closed meanwhile by another thread
-                os.set_inheritable(one, one == number)
+                os.set_inheritable(descriptor, descriptor == number)
 
 
 def take_handover() -> bytes | None:
-    """Return what the program before this one handed over; ``None`` if it was started regularly."""
+    """Return the state that was handed over; ``None`` if this program was started regularly."""
     number = os.environ.pop(_VARIABLE, "")
     if not number:
         return None

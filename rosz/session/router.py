@@ -1,7 +1,7 @@
 """A Zenoh router at the rendezvous: the session of ``rosz core``.
 
-Nodes find each other without it. It provides what needs a permanent process: a rendezvous that does
-not move, and links to other machines.
+Nodes find each other without it. It provides two things that need a permanent process: a rendezvous
+that does not move, and links to other machines.
 """
 
 from __future__ import annotations
@@ -14,22 +14,20 @@ import resource
 import socket
 import threading
 from collections.abc import Sequence
-from typing import Final, Self
+from typing import Final
 
 import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import RoszError, TransportError
-from rosz.lifecycle import Lifecycle
-from rosz.session.config import EPHEMERAL, SessionConfig, keys_of
+from rosz.lifecycle import Closing, Lifecycle
+from rosz.session.config import SessionConfig, ephemeral, keys_of
 from rosz.session.dialling import Dialling, who_answers
 from rosz.session.local_peers import CoreLock, LocalPeers, describe_process, find_holder
 from rosz.session.opening import outlasted_silence, places_of, settings_text
 from rosz.session.probe import is_listening
 from rosz.session.session import Session
 from rosz.wire import Endpoint
-
-__all__ = ("Beyond", "Router", "zenoh_configuration")
 
 _OCCUPIED: Final = re.compile(
     r"bound to (\S+?): \[.*address already in use|listener on (\S+) - unable to acquire lock",
@@ -39,14 +37,31 @@ _OCCUPIED: Final = re.compile(
 _POLL_SECONDS: Final = 2.0
 _ON_INTERFACE: Final = "#iface="
 _SUCCESSION_SECONDS: Final = 0.5
-_GREETING_TIMEOUT: Final = 3.0
+_IDENTIFY_TIMEOUT: Final = 3.0
 _FEW_FILES: Final = 1024
 """Limit of open files below which a router says how few nodes it has room for."""
 
 _log = logging.getLogger("rosz.core")
 
 
-class Router:
+class _OpenRouter(Closing):
+    """The lifecycle and the dialled endpoints of a router."""
+
+    _dialling: Dialling
+
+    def __init__(self, what: str) -> None:
+        self._lifecycle = Lifecycle(what, log=_log)
+
+    def announce(self) -> dict[str, bool]:
+        """Return the endpoints that it dials, each with whether it is reached, to be printed."""
+        return self._dialling.announce()
+
+    def close(self) -> None:
+        """Close the router; a second call has no effect."""
+        self._lifecycle.close()
+
+
+class Router(_OpenRouter):
     """A router, until closed.
 
     While another process holds the rendezvous, the router is linked to that process, and it takes
@@ -66,7 +81,7 @@ class Router:
 
     Raises:
         TransportError: An endpoint is occupied or malformed, another core of this domain runs on
-            this machine, or what holds the rendezvous is not Zenoh.
+            this machine, or the holder of the rendezvous is not Zenoh.
     """
 
     def __init__(
@@ -79,7 +94,7 @@ class Router:
         self.holder: str = ""
         self._is_full = False
         _allow_open_files()
-        self._lifecycle = Lifecycle("the router", log=_log)
+        super().__init__("the router")
         self.session: Session
         try:
             if _is_shareable(config):
@@ -99,7 +114,7 @@ class Router:
             raise _name_occupied(error, config) from error
         self._lifecycle.keep(self.session)
         listen, _ = places_of(config)
-        self.endpoints = tuple(place for place in listen if place != EPHEMERAL)
+        self.endpoints = tuple(place for place in listen if place != ephemeral())
         _check_certificate(config)
         self._dialling = self._lifecycle.keep(Dialling(self.session, config))
         if any(_ON_INTERFACE in place for place in listen):
@@ -111,10 +126,6 @@ class Router:
         """Return the configuration of a router whose rendezvous another process holds."""
         self.holder = _check_holder(config)
         return msgspec.structs.replace(config, rendezvous_is_held=True)
-
-    def announce(self) -> dict[str, bool]:
-        """Return the endpoints that it dials, each with whether it is reached, to be printed."""
-        return self._dialling.announce()
 
     def check_room(self) -> None:
         """Log a warning when there is no more room for links, and when there is again."""
@@ -135,23 +146,13 @@ class Router:
                 _log.warning("there is room for links again")
             self._is_full = False
 
-    def close(self) -> None:
-        """Close the router; a second call has no effect."""
-        self._lifecycle.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 def _allow_open_files() -> None:
     """Allow this process as many open files as it may have, since each link is one."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     try:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    except ValueError:  # on macOS, what counts as unlimited is more than the system allows
+    except ValueError:  # on macOS, unlimited is more than the system allows
         return
     if 0 < most < _FEW_FILES:
         _log.warning(
@@ -161,7 +162,7 @@ def _allow_open_files() -> None:
         )
 
 
-class Beyond:
+class ExternalRouter(_OpenRouter):
     """A router that is linked to other machines alone, until closed.
 
     Args:
@@ -194,20 +195,12 @@ class Beyond:
         self.endpoints: tuple[str, ...]
         self.endpoints, _ = places_of(config)
         self.outlasted_silence: float = outlasted_silence(config)
-        self._lifecycle = Lifecycle("the router beyond the machine", log=_log)
+        super().__init__("the router beyond the machine")
         try:
             self.session: Session = self._lifecycle.keep(Session.open(config))
         except TransportError as error:
             raise _name_occupied(error, config) from error
         self._dialling = self._lifecycle.keep(Dialling(self.session, config))
-
-    def announce(self) -> dict[str, bool]:
-        """Return the endpoints that it dials, each with whether it is reached, to be printed."""
-        return self._dialling.announce()
-
-    def close(self) -> None:
-        """Close the router; a second call has no effect."""
-        self._lifecycle.close()
 
 
 def zenoh_configuration(
@@ -259,13 +252,13 @@ class _NewInterfaces:
     def _watch(self) -> None:
         while not self._closing.wait(_POLL_SECONDS):
             # An interface that disappeared and came back has another number.
-            found = set(socket.if_nameindex())
-            for interface in self._known - found:
+            interfaces = set(socket.if_nameindex())
+            for interface in self._known - interfaces:
                 if interface in self._sessions:
                     self._sessions.pop(interface).close()
-            for interface in sorted(found - self._known):
+            for interface in sorted(interfaces - self._known):
                 self._listen(interface)
-            self._known = found
+            self._known = interfaces
 
     def _listen(self, interface: tuple[int, str]) -> None:
         name = interface[1]
@@ -358,16 +351,12 @@ def _is_shareable(config: SessionConfig) -> bool:
 
 
 def _check_holder(config: SessionConfig) -> str:
-    """Return who listens at the rendezvous.
-
-    Raises:
-        TransportError: It is not Zenoh.
-    """
+    """Return who listens at the rendezvous; refuse what is not Zenoh."""
     peers = LocalPeers.read(config.rendezvous)
     pid = find_holder(config.rendezvous)
     who = "another process" if pid is None else describe_process(pid)
     is_ours = any(peer.pid == pid for peer in peers)
-    answers = is_ours or who_answers(config.rendezvous, config, _GREETING_TIMEOUT)
+    answers = is_ours or who_answers(config.rendezvous, config, _IDENTIFY_TIMEOUT)
     if not answers and is_listening(config.rendezvous):
         raise TransportError(
             f"'{config.rendezvous}' is held by {who}, which does not speak Zenoh: end it, or set"
@@ -380,7 +369,7 @@ def _check_certificate(config: SessionConfig) -> None:
     """Log a warning if the certificate is of another machine, so that others refuse links."""
     if config.keys is None or all(Endpoint(place).is_local for place in config.listen):
         return
-    from rosz.security.handshake import certificate_names
+    from rosz.security import certificate_names
 
     names = certificate_names(config.keys)
     host = socket.gethostname()
@@ -402,7 +391,7 @@ def _name_occupied(error: TransportError, config: SessionConfig) -> TransportErr
         return error
     place = match[1] or match[2]
     listen, _ = places_of(config)
-    endpoint = next((one for one in listen if one.partition("#")[0].endswith(place)), place)
+    endpoint = next((text for text in listen if text.partition("#")[0].endswith(place)), place)
     pid = find_holder(endpoint)
     who = "another process" if pid is None else describe_process(pid)
     return TransportError(

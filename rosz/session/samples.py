@@ -17,8 +17,6 @@ from typing import Any
 import msgspec
 import zenoh
 
-__all__ = ("HybridClock", "Sample", "Stamp", "stamp_of", "to_timestamp")
-
 _SECOND = 1_000_000_000
 
 
@@ -78,23 +76,36 @@ def to_timestamp(stamp: Stamp | None) -> zenoh.Timestamp | None:
     return zenoh.Timestamp(zenoh.NTP64(seconds, nanoseconds), bytes.fromhex(digits)[::-1])
 
 
-class Sample:
-    """One put or delete that arrived."""
+class RawItem:
+    """An object of Zenoh that arrived."""
 
     __slots__ = ("_raw",)
 
-    def __init__(self, raw: zenoh.Sample) -> None:
+    def __init__(self, raw: Any) -> None:
         self._raw = raw
+
+    @property
+    def key(self) -> str:
+        """The key expression that was written or queried."""
+        return str(self._raw.key_expr)
+
+    @property
+    def attachment(self) -> bytes | None:
+        """The bytes sent beside the payload."""
+        raw = self._raw.attachment
+        return None if raw is None else raw.to_bytes()
+
+
+class Sample(RawItem):
+    """One put or delete that arrived."""
+
+    __slots__ = ()
+    _raw: zenoh.Sample
 
     @property
     def raw(self) -> Any:
         """Zenoh's own object, for this package alone."""
         return self._raw
-
-    @property
-    def key(self) -> str:
-        """The key that was written."""
-        return str(self._raw.key_expr)
 
     @property
     def payload(self) -> bytes:
@@ -105,12 +116,6 @@ class Sample:
     def size(self) -> int:
         """The size of the payload in bytes; reading it does not copy the payload."""
         return len(self._raw.payload)
-
-    @property
-    def attachment(self) -> bytes | None:
-        """The bytes sent beside the payload."""
-        raw = self._raw.attachment
-        return None if raw is None else raw.to_bytes()
 
     @property
     def stamp(self) -> Stamp | None:

@@ -1,6 +1,6 @@
 """The Zenoh session, which all communication uses.
 
-What arrives waits in channels (`rosz.session.channels`), from which threads of Python receive it.
+Arrived items wait in channels (`rosz.session.channels`), from which threads of Python receive them.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache, partial
-from typing import Any, Self, Unpack
+from typing import Any, Unpack
 from weakref import WeakValueDictionary
 
 import zenoh
 import zenoh.ext
 
 from rosz.errors import ClosedError
-from rosz.lifecycle import Closable, Lifecycle
-from rosz.session.at_exit import ENDING, OPEN, ClosedSession
+from rosz.lifecycle import Closable, Closing, Lifecycle
+from rosz.session.at_exit import OPEN, ClosedSession
 from rosz.session.channels import declare, declare_callback, declare_rare, open_channel
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
@@ -33,8 +33,6 @@ from rosz.session.opening import open_raw
 from rosz.session.queries import (
     PRIORITIES,
     TARGETS,
-    Cancellation,
-    Priority,
     Querier,
     Query,
     Queryable,
@@ -51,9 +49,7 @@ from rosz.session.zenoh_workarounds import (
     close_links_at_once,
     remove_abandoned_segments,
 )
-from rosz.worker import lend_thread
-
-__all__ = ("Session",)
+from rosz.worker import ENDING, lend_thread
 
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
 """Congestion control for a full link, by whether to wait for it."""
@@ -75,12 +71,12 @@ def _runtime() -> Lifecycle:
     return Lifecycle("the network")
 
 
-class Session:
+class Session(Closing):
     """One connection to the network.
 
-    Every method raises `ClosedError` when the session is closed. Those that take a key raise
-    `TransportError` when it is malformed, and those that take a timeout raise `UsageError` when it
-    is not a number.
+    Every method raises `ClosedError` when the session is closed, `PanicError` when Zenoh panics.
+    Those that take a key raise `InvalidName` when it is too long, `TransportError` when it is
+    malformed; those that take a timeout raise `UsageError` when it is not a number.
 
     Args:
         raw: The open session of Zenoh.
@@ -161,7 +157,7 @@ class Session:
             stamp: The time of the write.
             block: Whether to wait for a slow link instead of dropping the write.
         """
-        with translate_errors(f"write '{key}'"):
+        with translate_errors("write", key):
             self._raw.put(
                 key,
                 payload,
@@ -174,7 +170,7 @@ class Session:
         self, key: str, *, attachment: bytes | None = None, stamp: Stamp | None = None
     ) -> None:
         """Delete a value, waiting for a slow link rather than dropping the deletion."""
-        with translate_errors(f"delete '{key}'"):
+        with translate_errors("delete", key):
             self._raw.delete(
                 key,
                 attachment=attachment,
@@ -206,7 +202,7 @@ class Session:
         qos: Any = {"congestion_control": _CONGESTION[block], "reliability": reliability}
         qos |= {"allowed_destination": _ORIGIN[remote_only], "express": express}
         self._lifecycle.check_open(f"publish on '{key}'")
-        with translate_errors(f"publish on '{key}'"):
+        with translate_errors("publish on", key):
             if not cache:
                 return RawPublisher(key, self._raw.declare_publisher(key, **qos))
             # As rmw_zenoh does it. Zenoh requires both arguments of the detection.
@@ -241,7 +237,7 @@ class Session:
                 soon.
             history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
-            remote_only: Whether to ignore what this session itself publishes.
+            remote_only: Whether to ignore samples of this session itself.
             rare: Whether samples arrive rarely, and may wait; waiting for them costs less then.
         """
         make = declare_callback if rare else declare
@@ -268,7 +264,7 @@ class Session:
             depth: The number of samples to keep; a new one replaces the oldest.
             history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
-            remote_only: Whether to ignore what this session itself publishes.
+            remote_only: Whether to ignore samples of this session itself.
         """
         handler: Any = zenoh.handlers.RingChannel(depth)
         return PullSubscriber(key, self._subscribe(key, handler, history, recover, remote_only))
@@ -294,7 +290,7 @@ class Session:
     ) -> Any:
         origin = _ORIGIN[remote_only]
         self._lifecycle.check_open(f"subscribe to '{key}'")
-        with translate_errors(f"subscribe to '{key}'"):
+        with translate_errors("subscribe to", key):
             if not history:
                 return self._raw.declare_subscriber(key, handler, allowed_origin=origin)
             # As rmw_zenoh does it.
@@ -320,7 +316,7 @@ class Session:
                 query.
             complete: Whether the replies are all there are; ROS 2 clients query only such.
         """
-        with translate_errors(f"serve '{key}'"):
+        with translate_errors("serve", key):
             declared = declare_callback(
                 partial(self._raw.declare_queryable, key, complete=complete)
             )
@@ -339,12 +335,12 @@ class Session:
         """
         make = declare_rare if rare else declare
         options: Any = {"complete": complete, "allowed_origin": _ORIGIN[remote_only]}
-        with translate_errors(f"serve '{key}'"):
+        with translate_errors("serve", key):
             return Queryable(key, *make(partial(self._raw.declare_queryable, key, **options)))
 
     def token(self, key: str) -> Closable:
         """Declare a liveliness token, which others see until it is closed or the link ends."""
-        with translate_errors(f"declare token '{key}'"):
+        with translate_errors("declare token", key):
             token = Declared(f"token '{key}'", self._raw.liveliness().declare_token(key))
         self._tokens[key] = token
         return token
@@ -369,65 +365,46 @@ class Session:
         """
         watch = TokenWatch(callback, self._tokens, lambda: self.live_tokens(key, _TOKENS_SECONDS))
         make = declare if many else declare_callback
-        with translate_errors(f"watch tokens '{key}'"):
+        with translate_errors("watch tokens", key):
             liveliness = self._raw.liveliness()
             declared = make(partial(liveliness.declare_subscriber, key, history=True))
             if complete is not None:
                 watch.complete = complete
-                # After the watch: when the last reply has come, its channel has what existed, but
-                # for what another watch was told of before, which the replies name.
+                # After the watch: when the last reply has come, its channel has the tokens that
+                # existed, except those that another watch received before, which the replies name.
                 handler = liveliness.get(key, open_channel(), timeout=_TOKENS_SECONDS)
                 watch.existing = Replies(handler)
         what = f"watch of tokens '{key}'"
         return Callbacks(what, declared, watch.deliver, watch.begin, watch.idle)
 
-    def query(
-        self,
-        key: str,
-        *,
-        timeout: float,
-        payload: bytes | None = None,
-        attachment: bytes | None = None,
-        parameters: str = "",
-        target: Target = "all",
-        any_key: bool = False,
-        priority: Priority = "normal",
-        cancel: Cancellation | None = None,
-    ) -> Replies:
+    def query(self, key: str, *, timeout: float, **options: Unpack[QueryOptions]) -> Replies:
         """Send a query, and return the replies as they come; one that is not ``ok`` is an error.
 
         Args:
             key: The key expression to query.
             timeout: Time limit in seconds. When it is reached, one reply that is not ``ok``, with
                 the payload ``Timeout``, stands for all who have not replied.
-            payload: The payload of the query.
-            attachment: The bytes to send beside the payload.
-            parameters: The part of the selector after the ``?``.
-            target: Queryables that get the query.
-            any_key: Whether replies may be for keys that ``key`` does not match.
-            priority: Whether it and its replies overtake samples that wait for a slow link
-                (``urgent``), or let them pass (``background``).
-            cancel: The cancellation that can end the query early; one that was cancelled before
-                makes the query raise `ClosedError`.
+            options: The options; see `QueryOptions`.
         """
-        with translate_errors(f"query '{key}'"):
+        parameters, cancel = options.get("parameters"), options.get("cancel")
+        with translate_errors("query", key):
             handler = self._raw.get(
                 f"{key}?{parameters}" if parameters else key,
                 open_channel(),
-                target=TARGETS[target],
+                target=TARGETS[options.get("target", "all")],
                 consolidation=zenoh.ConsolidationMode.NONE,
-                accept_replies=zenoh.ReplyKeyExpr.ANY if any_key else None,
-                priority=PRIORITIES[priority],
+                accept_replies=zenoh.ReplyKeyExpr.ANY if options.get("any_key") else None,
+                priority=PRIORITIES[options.get("priority", "normal")],
                 timeout=clamp_timeout(timeout),
-                payload=payload,
-                attachment=attachment,
+                payload=options.get("payload"),
+                attachment=options.get("attachment"),
                 cancellation_token=None if cancel is None else cancel.token,
             )
         return Replies(handler)
 
     def querier(self, key: str, *, timeout: float, target: Target = "all") -> Querier:
         """Declare a query that is made often; the arguments are those of `query`."""
-        with translate_errors(f"query '{key}'"):
+        with translate_errors("query", key):
             entity = self._raw.declare_querier(
                 key,
                 target=TARGETS[target],
@@ -472,7 +449,7 @@ class Session:
 
     def live_tokens(self, key: str, timeout: float) -> list[str]:
         """Return the keys of all liveliness tokens that match, sorted."""
-        with translate_errors(f"look for tokens '{key}'"):
+        with translate_errors("look for tokens", key):
             handler = self._raw.liveliness().get(
                 key, open_channel(), timeout=clamp_timeout(timeout)
             )
@@ -499,11 +476,11 @@ class Session:
         """Return the other ends of the links of this session, by the ids of their sessions."""
         if ENDING.is_set():
             raise ClosedError("cannot look for links: the program ends")
-        found: dict[str, list[str]] = {}
+        ends: dict[str, list[str]] = {}
         with translate_errors("look for links"):
             for link in self._raw.info.links():
-                found.setdefault(str(link.zid), []).append(str(link.dst))
-        return found
+                ends.setdefault(str(link.zid), []).append(str(link.dst))
+        return ends
 
     def out_of_reach(self) -> set[str]:
         """Return the ids of the sessions of this machine whose processes are stopped."""
@@ -534,7 +511,7 @@ class Session:
         raw, self._raw = self._raw, ClosedSession("the session is closed")
         if self._registration is not None:
             self._registration.close()
-        with close_links(raw, self._rendezvous):
+        with close_links(raw, self._rendezvous), translate_errors("close the session"):
             try:
                 raw.close()
             except zenoh.ZError as error:
@@ -557,9 +534,3 @@ class Session:
         self._raw = ClosedSession(self._lifecycle.reason)
         ENDING.set()
         OPEN.clear()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -11,8 +11,6 @@ from rosz.errors import ClosedError, TransportError
 from rosz.session.declared import Declared
 from rosz.session.queries import Replies
 
-__all__ = ("TokenWatch",)
-
 _UNSETTLED_SECONDS = 10.0
 """Seconds from its beginning in which a watch may be told of the end of a token first."""
 
@@ -74,11 +72,12 @@ class TokenWatch:
             self._callback(token, alive)
 
     def idle(self) -> None:
-        """Report that what existed is complete, if it is."""
+        """Report that all tokens that existed have been reported, if they have."""
         report = self.complete
         if report is not None and self._is_complete():
-            for token in self._vanished():
-                self._callback(token, False)
+            if doubtful := self._appeared & self._gone:
+                for token in doubtful - self._alive(doubtful):  # it disappeared unnoticed
+                    self._callback(token, False)
             self.complete = None
             report()
 
@@ -109,8 +108,3 @@ class TokenWatch:
             self._appeared.add(token)
         elif token not in self._appeared:
             self._gone.add(token)  # one that was told of before may truly come again
-
-    def _vanished(self) -> set[str]:
-        """Return the tokens that have disappeared unnoticed."""
-        doubtful = self._appeared & self._gone
-        return doubtful - self._alive(doubtful) if doubtful else doubtful

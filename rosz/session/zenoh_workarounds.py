@@ -16,13 +16,13 @@ What happens without them:
   refuse both, because each finds the other one about to. Zenoh does not try again, so they would
   never meet.
 - `close_links_at_once`: When Zenoh closes a TCP connection, it makes the system wait up to ten
-  seconds until the other end has received what was sent (SO_LINGER, socket(7)), and that on the
+  seconds until the other end has received all data (SO_LINGER, socket(7)), and that on the
   thread that receives for the whole session. A new link to a machine that was cut off would be up
   long before any data came through it. Nothing is lost by not waiting: the system goes on sending.
 - `close_links`: Closing a session waits until the links that it is about to open have come about or
   failed, and until all that is queued for its links is sent. That takes ten seconds next to a
-  process that is stopped. Ending the connection below makes either fail at once. What the system
-  has accepted for the process is there when it resumes.
+  process that is stopped. Ending the connection below makes either fail at once. Data that the
+  system has accepted for the process is there when it resumes.
 - `remove_abandoned_segments`: Zenoh removes abandoned segments of shared memory only when a session
   with shared memory opens, so the memory of a process that was killed stays allocated until then.
 """
@@ -64,18 +64,6 @@ from rosz.session.probe import first_listening, is_listening
 from rosz.wire import Endpoint
 from rosz.worker import start_thread
 
-__all__ = (
-    "SEGMENTS",
-    "close_links",
-    "close_links_at_once",
-    "connect_to_running",
-    "open_and_listen",
-    "prepare_process",
-    "reachable_config",
-    "remove_abandoned_segments",
-    "remove_abandoned_sockets",
-)
-
 _RUNTIME = "ZENOH_RUNTIME"
 _ROUTER_RECEIVERS = 16
 _KEPT_BYTES = 31 << 20
@@ -88,6 +76,8 @@ _RARE_RETRIES = (
 A session that opens slowly is registered seconds before it listens. The small factor finds it after
 a quarter more of that time.
 """
+_FIND_SECONDS = 1.5
+"""Seconds in which another machine accepts a connection if somebody listens there."""
 _ATTEMPTS = 8
 _PAUSE = 0.02
 _OPEN_FILES: Final = Path("/dev/fd")
@@ -151,8 +141,15 @@ def reachable_config(config: SessionConfig, peers: LocalPeers) -> SessionConfig 
     wanted = [*config.connect, *local] if config.must_connect else [*local, *config.connect]
     if wanted == [config.rendezvous]:
         return config
-    endpoint = first_listening(wanted, config.open_timeout)
+    endpoint = first_listening(wanted, search_seconds(config, peers))
     return msgspec.structs.replace(config, rendezvous=endpoint, connect=()) if endpoint else None
+
+
+def search_seconds(config: SessionConfig, peers: LocalPeers) -> float:
+    """Return for how long a client looks for an endpoint that accepts connections."""
+    if config.connect and not peers.is_any_running:  # one that runs here may be about to listen
+        return min(config.open_timeout, _FIND_SECONDS)
+    return config.open_timeout
 
 
 def connect_to_running(settings: zenoh.Config, peers: LocalPeers, config: SessionConfig) -> None:
@@ -271,11 +268,11 @@ def close_links(raw: Any, rendezvous: str) -> Iterator[None]:
         yield
         return
     stopped = _StoppedPeers(raw, peers)
-    stopped.change(lambda one: one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_WAIT))
+    stopped.change(lambda end: end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_WAIT))
     over = threading.Event()
 
     def cut() -> None:
-        stopped.change(lambda one: one.shutdown(socket.SHUT_RDWR))
+        stopped.change(lambda end: end.shutdown(socket.SHUT_RDWR))
 
     def cut_repeatedly() -> None:
         pause = _GRACE_SECONDS
@@ -301,9 +298,6 @@ def _connections() -> Iterator[tuple[socket.socket, str, str]]:
     Zenoh does not hand out its sockets. The newest comes first. Addresses are written as in
     endpoints: ``127.0.0.1:7447``, ``[::1]:7447``, ``/run/z.sock``. A socket is a copy, which is
     valid until the next one is yielded.
-
-    Raises:
-        OSError: No file can be opened any more.
     """
     for number in sorted((int(file.name) for file in _OPEN_FILES.iterdir()), reverse=True):
         # Not all sockets are connected, and any file may be closed meanwhile.
@@ -311,8 +305,12 @@ def _connections() -> Iterator[tuple[socket.socket, str, str]]:
             # Closing the copy of a file would release all locks of this process on it (fcntl(2)).
             if not stat.S_ISSOCK(os.fstat(number).st_mode):
                 continue
-            with socket.socket(fileno=os.dup(number)) as found:
-                yield found, _format(found.getsockname()), _format(found.getpeername())
+            with socket.socket(fileno=os.dup(number)) as connection:
+                yield (
+                    connection,
+                    _format(connection.getsockname()),
+                    _format(connection.getpeername()),
+                )
 
 
 def _format(address: Any) -> str:
@@ -336,8 +334,8 @@ def remove_abandoned_segments(folder: Path = SEGMENTS, *, min_age: float = _MIN_
     Returns:
         The names of the files removed.
     """
-    found = folder.glob("*" + _SUFFIX)
-    return [path.name for path in found if _remove_abandoned(path, min_age)]
+    segments = folder.glob("*" + _SUFFIX)
+    return [path.name for path in segments if _remove_abandoned(path, min_age)]
 
 
 def remove_abandoned_sockets(rendezvous: str) -> None:
@@ -356,8 +354,8 @@ def _remove_abandoned(path: Path, min_age: float) -> bool:
     """Remove a file of this user that nobody has locked; return whether it was removed."""
     # Another process may remove it first, use it, or own it.
     with suppress(OSError):
-        found = path.stat()
-        if found.st_uid != os.getuid() or found.st_ctime >= time.time() - min_age:
+        status = path.stat()
+        if status.st_uid != os.getuid() or status.st_ctime >= time.time() - min_age:
             return False
         with path.open("r+b") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

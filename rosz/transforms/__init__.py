@@ -1,9 +1,8 @@
 """Transforms between coordinate frames, from ``/tf`` and ``/tf_static`` (REP 105).
 
 `poses` is the arithmetic and `buffer` the tree of frames over time; both are pure. `conversions`
-gives messages in other frames, `topics` connects a tree to a node, and `monitor` keeps account of
-what arrives. May import nodes and
-everything below them.
+gives messages in other frames, `topics` connects a tree to a node, and `monitor` measures
+rates and delays. May import nodes and everything below them.
 """
 
 from rosz.transforms.buffer import Buffer
@@ -18,8 +17,10 @@ from rosz.transforms.conversions import (
 )
 from rosz.transforms.monitor import (
     BroadcasterReport,
+    FrameParents,
     FrameReport,
     Monitor,
+    describe_other_parents,
     tree_as_dot,
     tree_as_text,
 )
@@ -46,6 +47,7 @@ __all__ = (
     "IDENTITY",
     "BroadcasterReport",
     "Buffer",
+    "FrameParents",
     "FrameReport",
     "Monitor",
     "Pose",
@@ -54,6 +56,7 @@ __all__ = (
     "TransformBroadcaster",
     "TransformListener",
     "compose",
+    "describe_other_parents",
     "describe_pose",
     "from_rpy",
     "invert",

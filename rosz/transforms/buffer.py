@@ -20,11 +20,9 @@ from rosz.errors import (
 from rosz.node import Clock
 from rosz.transforms.poses import Pose, Step, compose, compose_steps, invert
 
-__all__ = ("Buffer", "History", "Place")
-
 _SECOND = 1_000_000_000
 _MAX_DEPTH = 1000
-"""Largest depth of the tree; a deeper one must contain a loop."""
+"""Largest depth of the tree, as in tf2; a deeper one must contain a loop."""
 
 _LOOP = "The tf tree is invalid because it contains a loop."
 _UNIT_TOLERANCE = 1e-3
@@ -32,7 +30,7 @@ _MOST_DROPPED = 64
 """Places that are too old, and are kept at least until they are removed together."""
 
 
-class Place(NamedTuple):
+class ParentPose(NamedTuple):
     """The pose of a frame in its parent."""
 
     parent: str
@@ -45,9 +43,6 @@ class History:
     Args:
         length_ns: Age in nanoseconds, relative to the newest place, up to which places are kept.
         static: Whether one place is valid at all times.
-
-    Attributes:
-        static: As given.
     """
 
     def __init__(self, length_ns: int, *, static: bool) -> None:
@@ -56,21 +51,21 @@ class History:
         self._length = length_ns
         self._first = 0  # those before it are too old
         self._stamps: list[int] = []
-        self._places: list[Place] = []
+        self._places: list[ParentPose] = []
 
     @property
     def authority(self) -> str:
         """Source of the last place; empty if it is not known."""
         return self._authority() if callable(self._authority) else self._authority
 
-    def add(self, stamp: int, place: Place, authority: str | Callable[[], str]) -> bool:
+    def add(self, stamp: int, place: ParentPose, authority: str | Callable[[], str]) -> bool:
         """Add a place; return whether it is new and not too old."""
         if not self._add(stamp, place):
             return False
         self._authority = authority
         return True
 
-    def _add(self, stamp: int, place: Place) -> bool:
+    def _add(self, stamp: int, place: ParentPose) -> bool:
         if self.static:
             self._stamps, self._places = [stamp], [place]
             return True
@@ -106,7 +101,7 @@ class History:
         return (len(self._stamps) - self._first) / max((self.latest - self.oldest) / 1e9, 1e-4)
 
     @property
-    def newest(self) -> Place:
+    def newest(self) -> ParentPose:
         """The newest place."""
         return self._places[-1]
 
@@ -213,19 +208,21 @@ class Buffer:
             history = self._frames.get(child)
             if history is None or history.static != static:
                 history = self._frames[child] = History(self._length, static=static)
-            added = history.add(stamp, Place(parent, pose), authority)
+            added = history.add(stamp, ParentPose(parent, pose), authority)
             if added:
                 self._parents.add(parent)
-                for known, alarm in self._waiters:
-                    if known():
+                for condition, alarm in self._waiters:
+                    if condition():
                         alarm.close()
             return added
 
     def clear(self) -> None:
         """Remove all transforms but the static ones."""
         with self._lock:
-            self._frames = {name: one for name, one in self._frames.items() if one.static}
-            self._parents = {one.newest.parent for one in self._frames.values()}
+            self._frames = {
+                name: history for name, history in self._frames.items() if history.static
+            }
+            self._parents = {history.newest.parent for history in self._frames.values()}
 
     def frames(self) -> list[str]:
         """Return the names of all frames, sorted."""
@@ -311,13 +308,13 @@ class Buffer:
             if target == source:
                 history = self._frames.get(target)
                 return 0 if history is None else history.latest
-            # Each frame from the source upwards, with the latest time of what is below it.
+            # Each frame from the source upwards, with the latest time of the frames below it.
             below: dict[str, int] = {}
-            for frame, latest in self._latest_upwards(source):
+            for frame, latest in self._upwards(source):
                 if frame == target:
                     return latest
                 below[frame] = latest
-            for frame, latest in self._latest_upwards(target):
+            for frame, latest in self._upwards(target):
                 if frame in below:
                     return min(filter(None, (latest, below[frame])), default=0)
             raise _unconnected(target, source)
@@ -407,7 +404,7 @@ class Buffer:
                 f'"{name}" passed to lookupTransform argument {role} does not exist. '
             )
 
-    def _latest_upwards(self, frame: str) -> Iterator[tuple[str, int]]:
+    def _upwards(self, frame: str) -> Iterator[tuple[str, int]]:
         """Yield the frames from a frame up to the root, each with the latest known time.
 
         That is the latest one at which the pose of the first frame in it is known; 0 for any time.
@@ -421,17 +418,6 @@ class Buffer:
             newest = history.latest
             if newest and (newest < latest or not latest):
                 latest = newest
-            frame = history.newest.parent
-        raise TransformError(_LOOP)
-
-    def _upwards(self, frame: str) -> Iterator[tuple[str, int]]:
-        """Yield the frames from a frame up to the root with their latest times; 0 for the root."""
-        for _ in range(_MAX_DEPTH):
-            history = self._frames.get(frame)
-            if history is None:
-                yield frame, 0
-                return
-            yield frame, history.latest
             frame = history.newest.parent
         raise TransformError(_LOOP)
 
@@ -450,10 +436,10 @@ class Buffer:
             history = frames.get(frame)
             if history is None or frame in ends:
                 return steps, frame, ""
-            found = history.at(stamp)
-            if found is None:
+            place = history.at(stamp)
+            if place is None:
                 return steps, frame, history.why_not(stamp)
-            parent, steps[frame] = found
+            parent, steps[frame] = place
             frame = parent
         raise TransformError(_LOOP)
 
@@ -464,9 +450,9 @@ class Buffer:
         up, top, beyond = self._climb(source, stamp, (target,))
         if top == target:
             return up.values(), ()
-        known = {*up, top}
-        down, shared, why = self._climb(target, stamp, known)
-        if shared in known:
+        passed = {*up, top}
+        down, shared, why = self._climb(target, stamp, passed)
+        if shared in passed:
             way = itertools.takewhile(lambda step: step[0] != shared, up.items())
             return [step for _, step in way], down.values()
         beyond = why or beyond  # the last one counts, as in tf2

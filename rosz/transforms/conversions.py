@@ -18,16 +18,6 @@ if TYPE_CHECKING:
 
     Array = np.ndarray[Any, np.dtype[Any]]
 
-__all__ = (
-    "FIELD_FORMATS",
-    "transform_cloud",
-    "transform_message",
-    "transform_point",
-    "transform_pose",
-    "transform_vector",
-    "transform_wrench",
-)
-
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 FIELD_FORMATS = {
     PointField.INT8: "b",
@@ -58,8 +48,8 @@ def transform_message(message: Any, pose: Pose, header: Header) -> Any:
     for kind, transform in _TRANSFORMS.items():
         if isinstance(message, kind):
             return transform(message, pose, header)
-    known = ", ".join(sorted(kind.__name__ for kind in _TRANSFORMS))
-    raise UsageError(f"cannot transform a {type(message).__name__}; expected one of {known}")
+    names = ", ".join(sorted(kind.__name__ for kind in _TRANSFORMS))
+    raise UsageError(f"cannot transform a {type(message).__name__}; expected one of {names}")
 
 
 def transform_point(

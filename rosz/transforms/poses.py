@@ -7,21 +7,6 @@ from collections.abc import Iterable
 from math import acos, sin
 from typing import NamedTuple
 
-__all__ = (
-    "IDENTITY",
-    "Pose",
-    "Quaternion",
-    "Step",
-    "Vector",
-    "compose",
-    "compose_steps",
-    "describe_pose",
-    "from_rpy",
-    "invert",
-    "rotate",
-    "to_rpy",
-)
-
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 """``x, y, z, w``."""

@@ -9,11 +9,11 @@ import itertools
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from typing import Any
 
+from rosz.actions import ActionlibServer, ActionlibServerGoal
 from rosz.errors import TransformError
-from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rosz.msgs.std_msgs.msg import Header
@@ -21,14 +21,14 @@ from rosz.msgs.tf2_web_republisher.action import TFSubscription
 from rosz.msgs.tf2_web_republisher.msg import TFArray
 from rosz.msgs.tf2_web_republisher.srv import RepublishTFs
 from rosz.msgs.tf2_web_republisher_interfaces.action import TFSubscription as Ros2TFSubscription
-from rosz.node import Node, Publisher
+from rosz.node import Node
 from rosz.transforms.buffer import Buffer
 from rosz.transforms.poses import Pose
 from rosz.transforms.topics import TransformListener
-
-__all__ = ("Republisher",)
+from rosz.wire import Kind
 
 _NAME = "/tf2_web_republisher"
+_FEEDBACK = f"{_NAME}/feedback"
 _ACTION = "tf2_web_republisher/TFSubscriptionAction"
 _SERVICE = "/republish_tfs"
 _RATE = 10.0
@@ -52,14 +52,20 @@ class Republisher:
         self._buffer = Buffer()
         self._listener: TransformListener | None = None
         self._streams: dict[str, _Stream] = {}
-        message = node.context.types.message
-        self._feedback_type: Any = message(f"{_ACTION}Feedback")
-        self._feedback = node.publisher(f"{_NAME}/feedback", self._feedback_type, queue_size=100)
-        self._result_type: Any = message(f"{_ACTION}Result")
-        self._result = node.publisher(f"{_NAME}/result", self._result_type)
-        self._status = node.publisher(f"{_NAME}/status", GoalStatusArray, latch=True)
-        node.subscription(f"{_NAME}/goal", message(f"{_ACTION}Goal"), self._begin)
-        node.subscription(f"{_NAME}/cancel", GoalID, self._cancel)
+        followed = node.context.graph.follow_entities(Kind.SUBSCRIPTION, _FEEDBACK)
+        self._feedback = node.keep(followed)
+        # The states of goals are published when they change, as web pages do not need them.
+        server = ActionlibServer(
+            node,
+            _NAME,
+            node.context.types.message(_ACTION),
+            self._begin,
+            self._cancel,
+            status_frequency=0,
+            has_ros2=False,
+        )
+        server.status_timeout, server.queue_size = 0, 100
+        server.start()
         node.service(_SERVICE, RepublishTFs, self._republish)
         node.action_server(_NAME, Ros2TFSubscription, self._execute)
 
@@ -75,13 +81,9 @@ class Republisher:
     def _start(
         self, key: str, request: Any, send: Callable[[list[Any]], None], ended: Callable[[], bool]
     ) -> None:
-        """Send the transforms that a request is about when they have changed.
+        """Send the transforms of a request when they have changed, until nobody wants them.
 
-        Args:
-            key: Name of the stream; an older one of that name ends.
-            request: The request or goal.
-            send: Function that sends changed transforms.
-            ended: Function that tells whether nobody wants them any more.
+        An older stream of the key ends.
         """
         stream = _Stream(self._buffer, request, send)
         with self._lock:
@@ -100,21 +102,22 @@ class Republisher:
         rate = request.rate if 0 < request.rate <= _FASTEST else _RATE
         timer = self._node.timer(1 / rate, look)
 
-    def _stop(self, key: str) -> bool:
+    def _stop(self, key: str) -> None:
         with self._lock:
-            found = self._streams.pop(key, None) is not None
+            self._streams.pop(key, None)
             if self._listener is not None and not self._streams:
                 self._listener.close()
                 self._listener = None
                 self._buffer.clear()
-            return found
 
-    def _unheard(self, publisher: Publisher[Any], seconds: float) -> Callable[[], bool]:
+    def _unheard(
+        self, subscribers: Callable[[], Sized], seconds: float = _UNHEARD_SECONDS
+    ) -> Callable[[], bool]:
         """Return a function that tells whether a topic has had no subscribers for some time."""
         heard = [time.monotonic()]
 
         def unheard() -> bool:
-            if publisher.subscribers():
+            if len(subscribers()):
                 heard[0] = time.monotonic()
             return time.monotonic() - heard[0] > seconds
 
@@ -122,34 +125,24 @@ class Republisher:
 
     # ROS 1's action.
 
-    def _begin(self, message: Any) -> None:
-        goal_id = message.goal_id
-        key = f"goal {goal_id.id}"
+    def _begin(self, goal: ActionlibServerGoal) -> None:
+        unheard = self._unheard(lambda: self._feedback.view().subscriptions(_FEEDBACK))
 
         def send(transforms: list[Any]) -> None:
-            status = GoalStatus(goal_id, GoalStatus.ACTIVE)
-            feedback = TFSubscription.Feedback(transforms)
-            self._feedback.publish(self._feedback_type(self._header(), status, feedback))
+            goal.publish_feedback(TFSubscription.Feedback(transforms))
 
-        self._start(key, message.goal, send, self._unheard(self._feedback, _UNHEARD_SECONDS))
-        self._publish_status()
+        def ended() -> bool:
+            if unheard():
+                goal.cancel()
+                return True
+            return False
 
-    def _cancel(self, message: Any) -> None:
-        keys = [f"goal {message.id}"] if message.id else list(self._streams)
-        for key in keys:
-            if key.startswith("goal ") and self._stop(key):
-                status = GoalStatus(GoalID(Time(), key.removeprefix("goal ")), GoalStatus.PREEMPTED)
-                result = self._result_type(self._header(), status, TFSubscription.Result())
-                self._result.publish(result)
-        self._publish_status()
+        goal.accept()
+        self._start(f"goal {goal.id.id}", goal.message.goal, send, ended)
 
-    def _publish_status(self) -> None:
-        goals = [key.removeprefix("goal ") for key in self._streams if key.startswith("goal ")]
-        statuses = [GoalStatus(GoalID(Time(), one), GoalStatus.ACTIVE) for one in goals]
-        self._status.publish(GoalStatusArray(self._header(), statuses))
-
-    def _header(self) -> Header:
-        return Header(stamp=Time.from_nsec(self._node.now()))
+    def _cancel(self, goal: ActionlibServerGoal) -> None:
+        self._stop(f"goal {goal.id.id}")
+        goal.cancel()
 
     # The service, and ROS 2's action.
 
@@ -157,7 +150,7 @@ class Republisher:
         topic = f"/tf_repub_{next(self._numbers)}"
         publisher = self._node.publisher(topic, TFArray, latch=True)
         seconds = request.timeout.to_nsec() / 1e9 or _UNHEARD_SECONDS
-        unheard = self._unheard(publisher, seconds)
+        unheard = self._unheard(publisher.subscribers, seconds)
 
         def ended() -> bool:
             if unheard():
@@ -165,7 +158,9 @@ class Republisher:
                 return True
             return False
 
-        self._start(topic, request, lambda found: publisher.publish(TFArray(found)), ended)
+        self._start(
+            topic, request, lambda transforms: publisher.publish(TFArray(transforms)), ended
+        )
         return RepublishTFs.Response(topic)
 
     def _execute(self, goal: Any) -> None:
@@ -182,7 +177,7 @@ class Republisher:
 
 
 class _Stream:
-    """The transforms that one request is about, and what was sent of them."""
+    """The transforms of one request, and those of them that were sent."""
 
     def __init__(self, buffer: Buffer, request: Any, send: Callable[[list[Any]], None]) -> None:
         self._buffer = buffer
@@ -194,7 +189,7 @@ class _Stream:
         self._sent: dict[str, Pose] = {}
 
     def look(self) -> None:
-        """Send what has changed."""
+        """Send the transforms that have changed."""
         changed = []
         for source in self._sources:
             try:

@@ -20,15 +20,7 @@ from rosz.transforms.conversions import transform_message
 from rosz.transforms.poses import Pose
 from rosz.wire import format_token, gid
 
-__all__ = (
-    "Observe",
-    "StaticTransformBroadcaster",
-    "TransformBroadcaster",
-    "TransformListener",
-    "pose_of",
-)
-
-_QUEUE = QoS(depth=100)
+_QUEUE = QoS(depth=100)  # as in tf2_ros: many broadcasters share the topic
 _STATIC_PUBLISHER = QoS(depth=1, durability="transient_local")
 _STATIC_QUEUE = QoS(depth=100, durability="transient_local")
 
@@ -65,8 +57,8 @@ class StaticTransformBroadcaster:
 
     def send(self, transform: Any) -> None:
         """Publish one TransformStamped or several, together with all earlier ones."""
-        for one in _as_list(transform):
-            self._sent[one.child_frame_id] = deepcopy(one)  # the caller may change it
+        for stamped in _as_list(transform):
+            self._sent[stamped.child_frame_id] = deepcopy(stamped)  # the caller may change it
         self._publisher.publish(TFMessage(list(self._sent.values())))
 
 
@@ -104,22 +96,27 @@ class TransformListener:
         self._remove_hook = node.clock.on_jump(lambda _: buffer.clear())
         self._subscriptions = [
             node.subscription(
-                topic, TFMessage, partial(self._receive, static=static), qos=qos, with_info=True
+                topic,
+                TFMessage,
+                partial(self._receive, static=static),
+                queue_size=_QUEUE.depth,
+                qos=qos,
+                with_info=True,
             )
-            for topic, static, qos in (("/tf", False, _QUEUE), ("/tf_static", True, _STATIC_QUEUE))
+            for topic, static, qos in (("/tf", False, None), ("/tf_static", True, _STATIC_QUEUE))
         ]
 
     def _receive(self, message: TFMessage, info: MessageInfo, *, static: bool) -> None:
         # A message may arrive before the token of its publisher.
         authority = self.node_of(info.gid) or partial(self.node_of, info.gid)
-        for one in message.transforms:
-            stamp = one.header.stamp.sec * 10**9 + one.header.stamp.nanosec
+        for transform in message.transforms:
+            stamp = transform.header.stamp.sec * 10**9 + transform.header.stamp.nanosec
             try:
                 self.buffer.set(
-                    one.header.frame_id,
-                    one.child_frame_id,
+                    transform.header.frame_id,
+                    transform.child_frame_id,
                     stamp,
-                    pose_of(one.transform),
+                    pose_of(transform.transform),
                     static=static,
                     authority=authority,
                 )
@@ -173,8 +170,8 @@ class TransformListener:
         """
         header = message.header
         stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
-        pose, found = self.lookup(target, header.frame_id, stamp, timeout=timeout)
-        moved = Header(stamp=Time.from_nsec(found), frame_id=target)
+        pose, time = self.lookup(target, header.frame_id, stamp, timeout=timeout)
+        moved = Header(stamp=Time.from_nsec(time), frame_id=target)
         return transform_message(message, pose, moved)
 
     def node_of(self, publisher: bytes) -> str:

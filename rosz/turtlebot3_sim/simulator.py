@@ -32,8 +32,6 @@ from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import Node
 from rosz.turtlebot3_sim.world import ARENAS, BEAMS, LASER_X, RANGE_MAX, RANGE_MIN, Robot
 
-__all__ = ("STEP_NS", "Simulator", "main")
-
 STEP_NS = 10_000_000
 """Simulated time of one step in nanoseconds."""
 _ODOMETRY_HZ = 30
@@ -48,7 +46,7 @@ _SCAN_PERIOD = 0.2
 """Seconds between two scans."""
 _GRAVITY = 9.80665
 _UNKNOWN = 1e6
-"""Variance of what wheels cannot measure: height, roll and pitch."""
+"""Variance of height, roll and pitch, which wheels cannot measure."""
 
 
 def _diagonal(*values: float) -> list[float]:
@@ -62,19 +60,15 @@ _RATE_COVARIANCE = _diagonal(4e-8, 4e-8, 4e-8)
 _ACCELERATION_COVARIANCE = _diagonal(2.9e-4, 2.9e-4, 2.9e-4)
 
 
-class Simulator:
+class Turtlebot3Simulator:
     """A robot in an arena as a node; it ends with the node.
 
     The private parameters are ``world`` (``turtlebot3_world`` or ``empty``), ``x_pos``, ``y_pos``
     and ``yaw`` for the start, and ``real_time_factor``. Stamps are simulated time if
     ``/use_sim_time`` is set, else wall time; ``/clock`` is always published.
 
-    Args:
-        node: Node with the topics and parameters.
-
     Raises:
         UsageError: A parameter has an invalid value.
-        ParamError: A parameter has the wrong type.
     """
 
     def __init__(self, node: Node) -> None:
@@ -168,7 +162,7 @@ def main() -> None:
     """Simulate until the node is shut down."""
     with Node("turtlebot3_sim") as node:
         node.context.cooperative = True
-        Simulator(node)
+        Turtlebot3Simulator(node)
         node.spin()
 
 

@@ -1,4 +1,4 @@
-"""The robot and its surroundings, seen from above. Pure: no clock, no network.
+"""The robot and its arena, seen from above. Pure: no clock, no network.
 
 The robot is a TurtleBot3 Burger: two driven wheels, a laser, a round body; measures are those of
 the manufacturer's data sheet. The arena consists of straight walls and round pillars. Lengths are
@@ -16,35 +16,9 @@ import msgspec
 
 from rosz.errors import UsageError
 
-__all__ = (
-    "ARENAS",
-    "BEAMS",
-    "BODY_RADIUS",
-    "EMPTY",
-    "LASER_X",
-    "MAX_FORWARD",
-    "MAX_TURN",
-    "PILLARS",
-    "RANGE_MAX",
-    "RANGE_MIN",
-    "TRACK",
-    "WHEEL_RADIUS",
-    "Arena",
-    "Pillar",
-    "Robot",
-    "Wall",
-)
-
 
 class Wall(msgspec.Struct, frozen=True):
-    """A straight wall between two points.
-
-    Attributes:
-        x1: X of the first point.
-        y1: Y of the first point.
-        x2: X of the second point.
-        y2: Y of the second point.
-    """
+    """A straight wall between two points."""
 
     x1: float
     y1: float
@@ -71,13 +45,7 @@ class Wall(msgspec.Struct, frozen=True):
 
 
 class Pillar(msgspec.Struct, frozen=True):
-    """A round pillar.
-
-    Attributes:
-        x: X of the axis.
-        y: Y of the axis.
-        radius: Radius of the pillar.
-    """
+    """A round pillar; x and y are those of its axis."""
 
     x: float
     y: float
@@ -100,31 +68,20 @@ class Pillar(msgspec.Struct, frozen=True):
 
 
 class Arena(msgspec.Struct, frozen=True):
-    """A floor with obstacles.
-
-    Attributes:
-        obstacles: Walls and pillars.
-    """
+    """A floor with obstacles."""
 
     obstacles: Sequence[Wall | Pillar] = ()
 
     def clearance(self, x: float, y: float) -> float:
         """Return the distance from a point to the nearest surface; infinity without obstacles."""
-        return min((one.distance(x, y) for one in self.obstacles), default=math.inf)
+        return min((obstacle.distance(x, y) for obstacle in self.obstacles), default=math.inf)
 
     def ranges(self, x: float, y: float, angles: Iterable[float], limit: float) -> Iterator[float]:
-        """Yield the lengths of rays to the nearest obstacles; infinity beyond the limit.
-
-        Args:
-            x: X of the start of the rays.
-            y: Y of the start of the rays.
-            angles: Directions of the rays.
-            limit: Longest length of a ray.
-        """
-        near = [one for one in self.obstacles if one.distance(x, y) <= limit]
+        """Yield the lengths of rays to the nearest obstacles; infinity beyond the limit."""
+        near = [obstacle for obstacle in self.obstacles if obstacle.distance(x, y) <= limit]
         for angle in angles:
             cos, sin = math.cos(angle), math.sin(angle)
-            length = min((one.hit(x, y, cos, sin) for one in near), default=math.inf)
+            length = min((obstacle.hit(x, y, cos, sin) for obstacle in near), default=math.inf)
             yield length if length <= limit else math.inf
 
 
@@ -170,9 +127,6 @@ class Robot:
     """The robot.
 
     Attributes:
-        arena: Surroundings of the robot.
-        x: X of the center.
-        y: Y of the center.
         theta: Heading, from -pi to pi.
         forward: Commanded speed in m/s.
         turn: Commanded angular speed in rad/s.
@@ -192,11 +146,7 @@ class Robot:
     wheel_right: float = 0.0
 
     def command(self, forward: float, turn: float) -> None:
-        """Set the speed until the next command, limited to what the robot can do.
-
-        Args:
-            forward: Speed in m/s.
-            turn: Angular speed in rad/s.
+        """Set the speed in m/s and rad/s until the next command, within the limits of the robot.
 
         Raises:
             UsageError: An argument is not a number.
@@ -209,14 +159,14 @@ class Robot:
     def step(self, seconds: float) -> None:
         """Move along a circle or straight ahead, and stop at obstacles.
 
-        Args:
-            seconds: Duration in seconds, short enough not to pass through a wall.
+        The seconds must be few enough not to pass through a wall.
         """
         turned = self.turn * seconds
         length = self.forward * seconds
+        half = turned / 2  # which is 0 for the smallest numbers, too
         # The chord of an arc has the direction of the middle of the arc.
-        chord = length * (math.sin(turned / 2) / (turned / 2) if turned else 1.0)
-        middle = self.theta + turned / 2
+        chord = length * (math.sin(half) / half if half else 1.0)
+        middle = self.theta + half
         x, y = self.x + chord * math.cos(middle), self.y + chord * math.sin(middle)
         if self._is_free(x, y):
             self.x, self.y, self.speed = x, y, self.forward

@@ -5,9 +5,8 @@ which serves and fetches pictures, and the programs `program`, `teleop` and `dri
 modules, because each is loaded alone.
 """
 
-from rosz.turtlesim.snapshot import Picture, fetch
-from rosz.turtlesim.world import Pen, Turtle, World
+from rosz.turtlesim.snapshot import Snapshot, fetch
 
 PUBLIC_MODULES = ("teleop",)
 
-__all__ = ("Pen", "Picture", "Turtle", "World", "fetch")
+__all__ = ("Snapshot", "fetch")

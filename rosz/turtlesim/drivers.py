@@ -11,8 +11,6 @@ from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node, TimerEvent, serve_loggers
 
-__all__ = ("Square", "draw_square", "mimic")
-
 _SIDE = 2.0
 _SPEED = 1.0
 _TURN_SPEED = 0.4
@@ -41,11 +39,7 @@ class Square:
         self._pose = Pose()
 
     def next(self, pose: Pose) -> Twist:
-        """Return the next speed.
-
-        Args:
-            pose: Current pose of the turtle.
-        """
+        """Return the next speed at a pose of the turtle."""
         self._pose = pose
         return next(self._moves)
 
@@ -59,7 +53,7 @@ class Square:
             yield from self._stop()
             at = self._pose
             self._set_goal(at.x, at.y, math.remainder(at.theta + math.pi / 2, math.tau))
-            while self._angle_left() >= _NEAR_ANGLE:
+            while math.remainder(self.goal[2] - self._pose.theta, math.tau) >= _NEAR_ANGLE:
                 yield _move(turn=_TURN_SPEED)
             yield from self._stop()
 
@@ -77,9 +71,6 @@ class Square:
         """Return the distance to the goal; negative once the turtle has passed it."""
         x, y, theta = self.goal
         return (x - self._pose.x) * math.cos(theta) + (y - self._pose.y) * math.sin(theta)
-
-    def _angle_left(self) -> float:
-        return math.remainder(self.goal[2] - self._pose.theta, math.tau)
 
 
 def draw_square() -> None:

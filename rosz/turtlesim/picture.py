@@ -9,18 +9,11 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 
-from rosz.turtlesim.world import UNIT_PIXELS, Color, Field, Point, Turtle, span
-
-__all__ = ("Patch", "encode_png", "paint", "patches", "render")
+from rosz.turtlesim.world import UNIT_PIXELS, Canvas, Color, Point, Turtle, span
 
 
 class Patch(msgspec.Struct, frozen=True):
-    """A convex polygon of one color.
-
-    Attributes:
-        color: Color of the polygon.
-        outline: Corners in pixels of the field.
-    """
+    """A convex polygon of one color, with its corners in pixels of the field."""
 
     color: Color
     outline: tuple[Point, ...]
@@ -34,16 +27,16 @@ _KINDS = (
     ((196, 160, 214), (74, 40, 104), (118, 72, 152), (174, 128, 202)),
     ((214, 206, 120), (98, 92, 24), (152, 144, 48), (208, 200, 104)),
 )
-"""Colors of skin, rim, shell and plates of each kind of turtle."""
+"""For each kind of turtle, the colors of skin, rim, shell and plates."""
 _EYE = (24, 24, 24)
 
 
-def _oval(center: Point, radii: Point, turned: float = 0.0, corners: int = 20) -> tuple[Point, ...]:
-    cos, sin = math.cos(turned), math.sin(turned)
+def _oval(center: Point, radii: Point, angle: float = 0.0, corners: int = 20) -> tuple[Point, ...]:
+    cos, sin = math.cos(angle), math.sin(angle)
     outline: list[Point] = []
     for number in range(corners):
-        angle = math.tau * number / corners
-        x, y = radii[0] * math.cos(angle), radii[1] * math.sin(angle)
+        corner = math.tau * number / corners
+        x, y = radii[0] * math.cos(corner), radii[1] * math.sin(corner)
         outline.append((center[0] + cos * x - sin * y, center[1] + sin * x + cos * y))
     return tuple(outline)
 
@@ -52,7 +45,7 @@ def _plate(x: float, y: float, size: float) -> tuple[Point, ...]:
     return _oval((x, y), (size, size), corners=6)
 
 
-# A turtle that looks along x; one unit is one turtle length.
+# Outlines of a turtle that looks along x, in units of the field.
 _LIMBS = (
     ((-0.36, 0.07), (-0.36, -0.07), (-0.52, 0.0)),
     _oval((0.25, 0.33), (0.19, 0.085), 1.0),
@@ -73,34 +66,30 @@ _PLATES = (
 
 
 def patches(turtle: Turtle) -> Iterator[Patch]:
-    """Yield the polygons of a turtle at its position, from the lowest to the uppermost."""
+    """Yield the polygons of a turtle in the field, in the order of painting."""
     skin, rim, shell, plate = _KINDS[turtle.kind % len(_KINDS)]
-    at_x, at_y = turtle.pixel
-    ahead = UNIT_PIXELS * math.cos(turtle.theta)
-    aside = UNIT_PIXELS * math.sin(turtle.theta)
+    center_x, center_y = turtle.pixel
+    cos = UNIT_PIXELS * math.cos(turtle.theta)
+    sin = UNIT_PIXELS * math.sin(turtle.theta)
     layers = ((skin, _LIMBS), (_EYE, _EYES), (rim, (_RIM,)), (shell, (_SHELL,)), (plate, _PLATES))
     for color, outlines in layers:
         for outline in outlines:
-            placed = (
-                (at_x + ahead * x - aside * y, at_y - aside * x - ahead * y) for x, y in outline
+            # Rows of pixels count downwards, the y axis of the field upwards.
+            pixels = (
+                (center_x + cos * x - sin * y, center_y - sin * x - cos * y) for x, y in outline
             )
-            yield Patch(color, tuple(placed))
+            yield Patch(color, tuple(pixels))
 
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _TRUE_COLOR_8 = (8, 2, 0, 0, 0)
-"""Bit depth, color type, and the methods of compression, filtering and interlacing."""
+"""Fields of IHDR: bit depth, color type, compression, filter and interlace methods."""
 _LINES = 4
-"""Sampled lines in each row of pixels, for smooth edges."""
+"""Number of lines that are sampled in each row of pixels, for smooth edges."""
 
 
-def render(field: Field, turtles: Iterable[Turtle]) -> bytes:
-    """Render a field with its turtles as PNG.
-
-    Args:
-        field: Field, which is not changed.
-        turtles: Turtles, from the lowest to the uppermost.
-    """
+def render(field: Canvas, turtles: Iterable[Turtle]) -> bytes:
+    """Return a PNG of a field and its turtles; later turtles cover earlier ones."""
     pixels = bytearray(field.pixels)
     for turtle in turtles:
         for patch in patches(turtle):
@@ -109,50 +98,33 @@ def render(field: Field, turtles: Iterable[Turtle]) -> bytes:
 
 
 def paint(pixels: bytearray, width: int, height: int, patch: Patch) -> None:
-    """Paint a polygon with smooth edges.
-
-    Args:
-        pixels: RGB pixels, row by row.
-        width: Width in pixels.
-        height: Height in pixels.
-        patch: Polygon to paint; the parts outside the picture are ignored.
-    """
+    """Paint a polygon with smooth edges into RGB pixels; parts outside of them are ignored."""
     rows = [y for _, y in patch.outline]
     for row in range(max(0, math.floor(min(rows))), min(height, math.ceil(max(rows)) + 1)):
         coverage = _coverage(patch, row, width)
         for column, share in coverage.items():
-            _blend(pixels, 3 * (row * width + column), patch.color, min(share, 1.0))
+            for index, value in enumerate(patch.color, 3 * (row * width + column)):
+                pixels[index] = round(pixels[index] + min(share, 1.0) * (value - pixels[index]))
 
 
 def _coverage(patch: Patch, row: int, width: int) -> dict[int, float]:
-    """Return the share of each pixel of a row that a polygon covers, from 0 to 1."""
+    """Return which share of each pixel of a row a polygon covers, from 0 to 1, by column."""
     cover: dict[int, float] = {}
     for line in range(_LINES):
-        found = span(patch.outline, row - 0.5 + (line + 0.5) / _LINES)
-        if found is None:
+        crossing = span(patch.outline, row - 0.5 + (line + 0.5) / _LINES)
+        if crossing is None:
             continue
-        left, right = found[0] + 0.5, found[1] + 0.5
+        left, right = crossing[0] + 0.5, crossing[1] + 0.5
         for column in range(max(0, math.floor(left)), min(width, math.ceil(right))):
             share = min(right, column + 1) - max(left, column)
             cover[column] = cover.get(column, 0.0) + share / _LINES
     return cover
 
 
-def _blend(pixels: bytearray, at: int, color: Color, share: float) -> None:
-    for offset, value in enumerate(color, at):
-        pixels[offset] = round(pixels[offset] + share * (value - pixels[offset]))
-
-
 def encode_png(pixels: bytes | bytearray, width: int, height: int) -> bytes:
-    """Encode an RGB picture as PNG.
-
-    Args:
-        pixels: Three bytes per pixel, row by row from the top.
-        width: Width in pixels.
-        height: Height in pixels.
-    """
+    """Return a PNG of RGB pixels: three bytes per pixel, row by row from the top."""
     stride = 3 * width
-    # Each row begins with the number of its filter; 0 is none.
+    # Each row begins with the number of its filter; 0 means no filter.
     rows = b"".join(b"\0" + pixels[at : at + stride] for at in range(0, stride * height, stride))
     header = struct.pack(">2I5B", width, height, *_TRUE_COLOR_8)
     data = zlib.compress(rows, 6)

@@ -10,8 +10,6 @@ from rosz.turtlesim.picture import patches
 from rosz.turtlesim.simulator import Simulator
 from rosz.turtlesim.world import FIELD_PIXELS
 
-__all__ = ("Window", "WindowError", "main")
-
 _TITLE = "TurtleSim"
 _REFRESH_MS = 33
 
@@ -21,15 +19,7 @@ class WindowError(Exception):
 
 
 class Window:
-    """A window that shows a simulation until it is closed or the node ends.
-
-    Args:
-        node: Node to shut down when the window is closed.
-        simulator: Simulation to show.
-
-    Raises:
-        WindowError: There is no display, or Python was built without Tk.
-    """
+    """A window that shows a simulation; closing it shuts the node down. It needs Tk."""
 
     def __init__(self, node: Node, simulator: Simulator) -> None:
         try:

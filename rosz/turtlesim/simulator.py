@@ -1,6 +1,6 @@
 """The simulation as a node: topics, services and parameters of ROS 1's turtlesim (ROS wiki).
 
-One lock guards the world. A thread runs 62.5 steps per second of wall time, even where time is
+One lock protects the world. A thread runs 62.5 steps per second of wall time, even where time is
 simulated, as in ROS 1.
 """
 
@@ -10,7 +10,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz.errors import NotFoundError, RoszError, ServiceError, UsageError
 from rosz.msgs.geometry_msgs.msg import Twist
@@ -29,16 +29,11 @@ from rosz.msgs.turtlesim.srv import (
     TeleportRelative,
     TeleportRelativeRequest,
 )
-from rosz.node import Clock, Timer, TimerEvent
+from rosz.node import Clock, Node, Timer, TimerEvent
 from rosz.turtlesim import snapshot
 from rosz.turtlesim.picture import render
-from rosz.turtlesim.snapshot import Picture
+from rosz.turtlesim.snapshot import Snapshot
 from rosz.turtlesim.world import BACKGROUND, FIRST, SIZE, START, STEP_SECONDS, Pen, Turtle, World
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("Simulator",)
 
 Work = Callable[[Turtle], None]
 
@@ -106,11 +101,7 @@ class _TurtleTopics:
 
 
 class Simulator:
-    """A world of turtles as a node; it ends with the node.
-
-    Args:
-        node: Node with the topics, services and parameters.
-    """
+    """A world of turtles as a node; it ends with the node."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -137,18 +128,15 @@ class Simulator:
         period = round(STEP_SECONDS * 1e9)
         node.keep(Timer(period, self._step, Clock(), on_error=node.log.report, name="turtlesim"))
 
-    def picture(self) -> Picture:
+    def picture(self) -> Snapshot:
         """Return a picture of the field and its turtles."""
         with self._lock:
             field, turtles = self._world.field.copy(), self._copies()
         # Without the lock: rendering takes longer than a step.
-        return Picture(self._node.name, render(field, turtles))
+        return Snapshot(self._node.name, render(field, turtles))
 
-    def view(self, known: int) -> tuple[bytes | None, int, tuple[Turtle, ...]]:
-        """Return the state of the world for a window.
-
-        Args:
-            known: Version of the field that the caller has.
+    def view(self, version: int) -> tuple[bytes | None, int, tuple[Turtle, ...]]:
+        """Return the state of the world for a window that has a version of the field.
 
         Returns:
             Pixels of the field, or None if they have not changed; version of the field; copies of
@@ -156,12 +144,12 @@ class Simulator:
         """
         with self._lock:
             field = self._world.field
-            pixels = bytes(field.pixels) if field.version != known else None
+            pixels = bytes(field.pixels) if field.version != version else None
             return pixels, field.version, self._copies()
 
     def _copies(self) -> tuple[Turtle, ...]:
         turtles = self._world.turtles.values()
-        return tuple(Turtle(one.x, one.y, one.theta, one.kind) for one in turtles)
+        return tuple(Turtle(turtle.x, turtle.y, turtle.theta, turtle.kind) for turtle in turtles)
 
     def _step(self, _: TimerEvent) -> None:
         with self._lock:

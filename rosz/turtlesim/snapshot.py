@@ -18,12 +18,10 @@ if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.session import Query, Session
 
-__all__ = ("Picture", "fetch", "serve")
-
 _TIMEOUT = 5.0
 
 
-class Picture(msgspec.Struct, frozen=True):
+class Snapshot(msgspec.Struct, frozen=True):
     """A picture of a simulation.
 
     Attributes:
@@ -35,7 +33,7 @@ class Picture(msgspec.Struct, frozen=True):
     png: bytes
 
 
-def serve(node: Node, take: Callable[[], Picture]) -> None:
+def serve(node: Node, take: Callable[[], Snapshot]) -> None:
     """Serve pictures until a node is closed.
 
     Args:
@@ -56,7 +54,7 @@ def serve(node: Node, take: Callable[[], Picture]) -> None:
     node.keep(context.session.queryable(key, worker.submit))
 
 
-def fetch(session: Session, domain: int, node: str = "") -> Picture:
+def fetch(session: Session, domain: int, node: str = "") -> Snapshot:
     """Fetch a picture from a running simulator.
 
     Args:
@@ -71,17 +69,17 @@ def fetch(session: Session, domain: int, node: str = "") -> Picture:
     """
     replies = session.get(own_key(domain, "picture", "*", "*"), timeout=_TIMEOUT)
     try:
-        found = [msgspec.msgpack.decode(r.payload, type=Picture) for r in replies if r.ok]
+        pictures = [msgspec.msgpack.decode(r.payload, type=Snapshot) for r in replies if r.ok]
     except msgspec.DecodeError as error:
         raise RoszError(f"a picture came damaged: {error}") from error
-    names = sorted(picture.node for picture in found)
+    names = sorted(picture.node for picture in pictures)
     if node:
-        found = [picture for picture in found if picture.node == node]
+        pictures = [picture for picture in pictures if picture.node == node]
     if not names:
         raise NotFoundError("no turtlesim is running: start 'rosz run turtlesim turtlesim_node'")
-    if not found:
+    if not pictures:
         hint = near_miss(node, names) or f"; running: {', '.join(names)}"
         raise NotFoundError(f"no turtlesim runs as '{node}'{hint}")
-    if len(found) > 1 and not node:
+    if len(pictures) > 1 and not node:
         raise UsageError(f"several turtlesims are running: name one by --node: {', '.join(names)}")
-    return found[0]
+    return pictures[0]

@@ -20,8 +20,6 @@ from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.msgs.turtlesim.msg import Pose
 from rosz.node import Node, serve_loggers
 
-__all__ = ("KeyDecoder", "Keyboard", "Teleop", "main")
-
 _ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
 _ESCAPE = "\x1b"
 _POLL_SECONDS = 0.2
@@ -38,11 +36,7 @@ class KeyDecoder:
         self._pending = ""
 
     def feed(self, data: bytes) -> Iterator[str]:
-        """Yield the keys that are complete.
-
-        Args:
-            data: Input bytes; only ASCII is decoded correctly.
-        """
+        """Yield the keys that are complete; only ASCII is decoded correctly."""
         for character in data.decode("latin-1"):
             if character == _ESCAPE:
                 self._pending = character
@@ -141,11 +135,9 @@ G, B, V, C, D, E, R and T turn it the way they lie around F, and F stops the tur
 
 
 class Teleop:
-    """Commands for a turtle from keys.
+    """Commands for a turtle from keys; the node publishes ``turtle1/cmd_vel``.
 
-    Args:
-        node: Node that publishes ``turtle1/cmd_vel``; its parameters ``~scale_linear`` and
-            ``~scale_angular`` are the speeds.
+    The parameters ``~scale_linear`` and ``~scale_angular`` are the speeds.
     """
 
     def __init__(self, node: Node) -> None:
@@ -157,14 +149,7 @@ class Teleop:
         self._subscribed = False
 
     def press(self, key: str) -> bool:
-        """Handle a key.
-
-        Args:
-            key: Character, or name of an arrow.
-
-        Returns:
-            False after ``q``, which ends the program.
-        """
+        """Handle a character, or the name of an arrow; return False after ``q``, the end."""
         key = key.lower()
         if key in _DIRECTIONS:
             self._heading = None
@@ -172,7 +157,9 @@ class Teleop:
             self._move(self._linear * forward, self._angular * turn)
         elif key in _HEADINGS:
             self._heading = _HEADINGS[key]
-            self._subscribe()
+            if not self._subscribed:
+                self._subscribed = True
+                self._node.subscription("turtle1/pose", Pose, self._turn, queue_size=1)
         elif key in {"f", "q"} and self._heading is not None:
             self._heading = None
             self._move(0, 0)
@@ -180,12 +167,6 @@ class Teleop:
 
     def _move(self, forward: float, turn: float) -> None:
         self._commands.publish(Twist(Vector3(x=forward), Vector3(z=turn)))
-
-    def _subscribe(self) -> None:
-        """Subscribe to the pose, once."""
-        if not self._subscribed:
-            self._subscribed = True
-            self._node.subscription("turtle1/pose", Pose, self._turn, queue_size=1)
 
     def _turn(self, pose: Pose) -> None:
         heading = self._heading

@@ -11,23 +11,6 @@ import msgspec
 
 from rosz.errors import NotFoundError, UsageError
 
-__all__ = (
-    "BACKGROUND",
-    "FIELD_PIXELS",
-    "FIRST",
-    "SIZE",
-    "START",
-    "STEP_SECONDS",
-    "UNIT_PIXELS",
-    "Color",
-    "Field",
-    "Pen",
-    "Point",
-    "Turtle",
-    "World",
-    "span",
-)
-
 FIELD_PIXELS = 500
 """Width and height of the field in pixels."""
 UNIT_PIXELS = 45
@@ -46,21 +29,13 @@ Color = tuple[int, int, int]
 Point = tuple[float, float]
 
 
-class Field:
-    """The picture that turtles draw on.
+class Canvas:
+    """The picture that turtles draw on: three bytes per pixel, row by row from the top.
 
     Coordinates are pixels from the upper left corner, x to the right and y down; pixel ``i`` has
     its center at ``i``. Drawing outside the picture is allowed and has no effect.
 
-    Args:
-        width: Width in pixels.
-        height: Height in pixels.
-        color: Initial color of all pixels.
-
     Attributes:
-        width: As given.
-        height: As given.
-        pixels: Three bytes per pixel, row by row from the top.
         version: Number that grows with every change.
     """
 
@@ -71,9 +46,9 @@ class Field:
         self.pixels: bytearray = bytearray()
         self.fill(color)
 
-    def copy(self) -> Field:
+    def copy(self) -> Canvas:
         """Return an independent copy."""
-        copied = Field(0, 0, (0, 0, 0))
+        copied = Canvas(0, 0, (0, 0, 0))
         copied.width, copied.height, copied.version = self.width, self.height, self.version
         copied.pixels = bytearray(self.pixels)
         return copied
@@ -91,23 +66,16 @@ class Field:
         return red, green, blue
 
     def line(self, start: Point, end: Point, width: float, color: Color) -> None:
-        """Draw a straight line with round ends.
-
-        Args:
-            start: Start of the line.
-            end: End of the line; may equal the start.
-            width: Width in pixels.
-            color: Color of the line.
-        """
+        """Draw a straight line with round ends, which may be equal; the width is in pixels."""
         radius = width / 2
         body = _body(start, end, radius)
         top = max(0, math.ceil(min(start[1], end[1]) - radius))
         bottom = min(self.height, math.ceil(max(start[1], end[1]) + radius))
         for row in range(top, bottom):
             spans = [_disc_span(start, radius, row), _disc_span(end, radius, row), span(body, row)]
-            found = [one for one in spans if one is not None]
-            if found:
-                self._fill_row(row, min(s[0] for s in found), max(s[1] for s in found), color)
+            crossed = [ends for ends in spans if ends is not None]
+            if crossed:
+                self._fill_row(row, min(s[0] for s in crossed), max(s[1] for s in crossed), color)
         self.version += 1
 
     def _fill_row(self, row: int, left: float, right: float, color: Color) -> None:
@@ -158,13 +126,7 @@ def _body(start: Point, end: Point, radius: float) -> tuple[Point, ...]:
 
 
 class Pen(msgspec.Struct, frozen=True):
-    """The pen of a turtle.
-
-    Attributes:
-        color: Color of the line.
-        width: Width of the line in pixels.
-        on: Whether the pen draws.
-    """
+    """The pen of a turtle; its width is in pixels."""
 
     color: Color = (179, 184, 255)
     width: int = 3
@@ -173,17 +135,13 @@ class Pen(msgspec.Struct, frozen=True):
 
 @dataclass
 class Turtle:
-    """A turtle.
+    """A turtle; speeds are in units per second and rad/s.
 
     Attributes:
         x: Distance from the left edge in units.
         y: Distance from the lower edge in units.
         theta: Heading in rad, counter-clockwise from the x axis.
         kind: Number of its appearance.
-        forward: Forward speed in units per second.
-        left: Speed to the left in units per second.
-        turn: Angular speed in rad/s, counter-clockwise.
-        pen: Pen of the turtle.
         sees: Color below the turtle, before it drew the last step.
     """
 
@@ -210,13 +168,7 @@ class Turtle:
         return math.hypot(self.forward, self.left)
 
     def command(self, now: float, *, forward: float, left: float, turn: float) -> None:
-        """Set the speed for the next second.
-
-        Args:
-            now: Time in seconds, of the same clock as for `step`.
-            forward: Forward speed in units per second.
-            left: Speed to the left in units per second.
-            turn: Angular speed in rad/s.
+        """Set the speeds for the next second, from a time of the same clock as for `step`.
 
         Raises:
             UsageError: A speed is infinite or not a number.
@@ -226,11 +178,7 @@ class Turtle:
         self._commanded = now
 
     def teleport_to(self, x: float, y: float, theta: float) -> None:
-        """Move to a place at the next step, and draw a line there.
-
-        Raises:
-            UsageError: An argument is infinite or not a number.
-        """
+        """Move to a place at the next step, and draw a line there; the numbers must be finite."""
         _check_finite(x=x, y=y, theta=theta)
 
         def jump() -> None:
@@ -239,11 +187,7 @@ class Turtle:
         self._jumps.append(jump)
 
     def teleport_by(self, length: float, theta: float) -> None:
-        """Rotate, then move forward, at the next step.
-
-        Raises:
-            UsageError: An argument is infinite or not a number.
-        """
+        """Rotate, then move forward, at the next step; the numbers must be finite."""
         _check_finite(linear=length, angular=theta)
 
         def jump() -> None:
@@ -253,16 +197,8 @@ class Turtle:
 
         self._jumps.append(jump)
 
-    def step(self, picture: Field, now: float) -> Point | None:
-        """Move for `STEP_SECONDS`, and draw.
-
-        Args:
-            picture: Field to draw on.
-            now: Time in seconds.
-
-        Returns:
-            The place behind the wall where the turtle was going, if a wall stopped it.
-        """
+    def step(self, picture: Canvas, now: float) -> Point | None:
+        """Move for `STEP_SECONDS`, and draw; return the place behind a wall that stopped it."""
         for jump in self._jumps:
             before = self.x, self.y
             jump()
@@ -280,7 +216,7 @@ class Turtle:
         self._draw(picture, before)
         return goal if goal != (self.x, self.y) else None
 
-    def _draw(self, picture: Field, before: Point) -> None:
+    def _draw(self, picture: Canvas, before: Point) -> None:
         if self.pen.on and before != (self.x, self.y):
             picture.line(_pixel(before), self.pixel, self.pen.width, self.pen.color)
 
@@ -311,33 +247,16 @@ FIRST = "turtle1"
 
 
 class World:
-    """A field with turtles; empty at first.
-
-    Args:
-        background: Color of the field.
-
-    Attributes:
-        field: Field with the lines of the turtles.
-        turtles: Turtles by name, in the order of their creation.
-    """
+    """A field with turtles by name, in the order of their creation; empty at first."""
 
     def __init__(self, background: Color = BACKGROUND) -> None:
-        self.field: Field = Field(FIELD_PIXELS, FIELD_PIXELS, background)
+        self.field: Canvas = Canvas(FIELD_PIXELS, FIELD_PIXELS, background)
         self.turtles: dict[str, Turtle] = {}
         self._named = 0
         self._spawned = 0
 
     def spawn(self, x: float, y: float, theta: float, name: str = "") -> str:
-        """Add a turtle.
-
-        Args:
-            x: Distance from the left edge in units.
-            y: Distance from the lower edge in units.
-            theta: Heading in rad.
-            name: Name of the turtle; ``turtle1``, ``turtle2`` … when empty.
-
-        Returns:
-            The name.
+        """Add a turtle, and return its name: ``turtle1``, ``turtle2`` … when none is given.
 
         Raises:
             UsageError: The name is taken, or an argument is infinite or not a number.
@@ -359,21 +278,13 @@ class World:
                 return name
 
     def kill(self, name: str) -> None:
-        """Remove a turtle; its lines stay.
-
-        Raises:
-            NotFoundError: There is no turtle of that name.
-        """
+        """Remove a turtle; its lines stay. Raises `NotFoundError` if there is none of that name."""
         if name not in self.turtles:
             raise NotFoundError(f"tried to kill turtle [{name}], which does not exist")
         del self.turtles[name]
 
     def clear(self, background: Color) -> None:
-        """Remove all lines.
-
-        Args:
-            background: New color of the field.
-        """
+        """Remove all lines."""
         self.field.fill(background)
 
     def reset(self, background: Color) -> str:
@@ -384,13 +295,9 @@ class World:
         return self.spawn(START, START, 0.0)
 
     def step(self, now: float) -> Iterator[tuple[str, Point]]:
-        """Move all turtles by one step.
+        """Move all turtles by one step, at a time as for `Turtle.command`.
 
-        Args:
-            now: Time in seconds, as for `Turtle.command`.
-
-        Yields:
-            Name of a turtle that hit a wall, and the place behind the wall where it was going.
+        Yields the name of each that hit a wall, and the place behind the wall where it was going.
         """
         for name, turtle in self.turtles.items():
             goal = turtle.step(self.field, now)

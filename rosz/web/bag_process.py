@@ -1,6 +1,6 @@
 """A process that records or plays bags for the page, ``python -m rosz.web.bag_process``.
 
-It is one of its own, so that neither the page nor what it publishes waits for the other. Lines of
+It is one of its own, so that neither the page nor the messages wait for the other. Lines of
 JSON on standard input are the `BagOrder` and then `BagCommand` values; lines on standard output are
 `BagReport` values. It ends by itself when standard input does: a page that is killed leaves a whole
 bag.
@@ -11,28 +11,25 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 import msgspec
 
+from rosz.bags.play import Player, Progress
 from rosz.errors import ClosedError, RoszError
+from rosz.node import Node
 from rosz.web.model import BagCommand, BagOrder, BagReport, PlayOrder, RecordOrder
 from rosz.worker import start_thread
-
-if TYPE_CHECKING:
-    from rosz.bags.player import Player, Progress
-    from rosz.bags.recording import RecordOptions
-
-__all__ = ()
 
 _PERIOD = 0.5
 _SWITCH_SECONDS = 0.0005
 """The thread that reads ahead must not keep the one that publishes waiting for longer."""
 
 
-class _Line:
+class _PageChannel:
     """Both ends of the conversation."""
 
     def __init__(self, commands: IO[bytes], reports: IO[bytes]) -> None:
@@ -44,13 +41,13 @@ class _Line:
         """Return the first line."""
         return msgspec.json.decode(self._commands.readline(), type=BagOrder)
 
-    def follow(self, obey: Callable[[BagCommand], object]) -> None:
-        """Obey each further line on a thread, and ``stop`` at the end."""
+    def follow(self, handle: Callable[[BagCommand], object]) -> None:
+        """Handle each further line on a thread, and ``stop`` at the end."""
 
         def read() -> None:
             for line in self._commands:
-                obey(msgspec.json.decode(line, type=BagCommand))
-            obey(BagCommand("stop"))
+                handle(msgspec.json.decode(line, type=BagCommand))
+            handle(BagCommand("stop"))
 
         start_thread(threading.Thread(target=read, name="rosz-bag-commands", daemon=True))
 
@@ -68,38 +65,33 @@ class _Line:
         self.report(BagReport(said=text))
 
 
-def _record(order: RecordOrder, line: _Line) -> None:
-    from time import monotonic
+def _record(order: RecordOrder, line: _PageChannel) -> None:
+    from rosz.bags.record import BagFiles, ParameterRecord, Recorder, Selection
 
-    from rosz.bags.parameters import ParameterRecord
-    from rosz.bags.recorder import Recorder
-    from rosz.bags.recording import BagFiles, Selection
-    from rosz.node import Node
-
-    options = _options(order)
     selection = Selection(order.topics, every=not order.topics, exclude=order.exclude)
     ended = threading.Event()
 
-    def obey(command: BagCommand) -> None:
+    def handle(command: BagCommand) -> None:
         if command.do == "stop":
             ended.set()
 
     with ExitStack() as stack:
         node = stack.enter_context(Node("record", anonymous=True, argv=()))
-        files = stack.enter_context(BagFiles(options, line.say))
-        parameters = stack.enter_context(ParameterRecord(node, files, line.say))
-        files.begin = parameters.begin
+        files = stack.enter_context(BagFiles(order, line.say))
+        if selection.parameters:
+            parameters = stack.enter_context(ParameterRecord(node, files, line.say))
+            files.begin = parameters.begin
         recorder = stack.enter_context(
-            Recorder(node, selection, files, lambda _: None, 0, ended, buffer=options.buffer)
+            Recorder(node, selection, files, lambda _: None, 0, ended, buffer=order.buffer)
         )
-        begun = monotonic()
+        begun = time.monotonic()
 
         def report() -> None:
             disk = os.statvfs(".")
             line.report(
                 BagReport(
                     path=files.path.name,
-                    seconds=monotonic() - begun,
+                    seconds=time.monotonic() - begun,
                     messages=files.count,
                     size=files.size,
                     lost=recorder.lost,
@@ -109,40 +101,16 @@ def _record(order: RecordOrder, line: _Line) -> None:
             )
 
         stack.callback(report)  # once more, before the bag is finished
-        line.follow(obey)
+        line.follow(handle)
         while not (files.finished.is_set() or ended.wait(_PERIOD) or node.is_shutdown):
-            files.tick(node.now())
             report()
         if recorder.error is not None:
             raise recorder.error
 
 
-def _options(order: RecordOrder) -> RecordOptions:
-    from rosz.bags.recording import RecordOptions
-
-    return RecordOptions(
-        name=order.name,
-        split=bool(order.split_size or order.split_seconds),
-        size=order.split_size,
-        duration=round(order.split_seconds * 1e9),
-        max_splits=order.max_splits,
-        compression=order.compression,
-    )
-
-
-def _play(order: PlayOrder, line: _Line) -> None:
+def _play(order: PlayOrder, line: _PageChannel) -> None:
     from rosz.bags import open_reader
-    from rosz.bags.player import Player, PlayOptions
-    from rosz.node import Node
 
-    options = PlayOptions(
-        rate=order.rate,
-        loop=order.loop,
-        paused=order.paused,
-        prefix=order.prefix,
-        topics=order.topics,
-        clock=100.0 if order.clock else 0.0,
-    )
     sys.setswitchinterval(_SWITCH_SECONDS)
     with ExitStack() as stack:
         reader = stack.enter_context(open_reader(order.name))
@@ -163,13 +131,13 @@ def _play(order: PlayOrder, line: _Line) -> None:
                 )
             )
 
-        player = Player(node, [reader], options, line.say, report)
-        line.follow(lambda command: _obey(player, command))
+        player = Player(node, [reader], order, line.say, report)
+        line.follow(lambda command: _handle(player, command))
         player.advertise()
         player.run()
 
 
-def _obey(player: Player, command: BagCommand) -> None:
+def _handle(player: Player, command: BagCommand) -> None:
     if command.do == "stop":
         player.stop()
     elif command.do == "pause":
@@ -185,11 +153,11 @@ def _obey(player: Player, command: BagCommand) -> None:
 
 
 def _main() -> None:
-    """Do what the first line says."""
+    """Execute the command of the first line."""
     reports = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # only reports go to the page; the node's log goes to standard error
     # Unbuffered, since the thread that waits for a line must not hold a lock when the process ends.
-    line = _Line(os.fdopen(os.dup(0), "rb", buffering=0), reports)
+    line = _PageChannel(os.fdopen(os.dup(0), "rb", buffering=0), reports)
     order = line.order()
     try:
         if order.record is not None:

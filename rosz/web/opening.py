@@ -7,18 +7,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosz.bridges.admission import is_loopback
-from rosz.bridges.opening import ServerSettings, grant_access
+from rosz.access import PagePolicy, ServerSettings, is_loopback, open_access
 from rosz.errors import UsageError
 from rosz.msgs.std_srvs.srv import Trigger
-from rosz.web.guard import Guard
-from rosz.web.model import Permission
 
 if TYPE_CHECKING:
     from rosz.node import Node
     from rosz.web.server import PageServer
-
-__all__ = ("PAGE_SERVICE", "PORT", "Settings", "open_page")
 
 PORT = 8080
 PAGE_SERVICE = "page"
@@ -28,7 +23,7 @@ HOLDER = "web"
 _LIBRARY = "the page needs a library: pip install 'rosz[web]'"
 
 
-class Settings(ServerSettings, frozen=True, kw_only=True):
+class PageSettings(ServerSettings, frozen=True, kw_only=True):
     """Settings of the page.
 
     Attributes:
@@ -58,7 +53,7 @@ def _import_server() -> type[PageServer]:
     return PageServer
 
 
-def open_page(node: Node, settings: Settings) -> tuple[PageServer, list[str]]:
+def open_page(node: Node, settings: PageSettings) -> tuple[PageServer, list[str]]:
     """Serve the page, and return the server with its address and lines that say more.
 
     Args:
@@ -71,18 +66,20 @@ def open_page(node: Node, settings: Settings) -> tuple[PageServer, list[str]]:
     """
     if not settings.bags.is_dir():
         raise UsageError(f"--bags: '{settings.bags}' is not a folder")
-    access = grant_access(node, settings, HOLDER)
+    access = open_access(node, settings, HOLDER)
     if importlib.util.find_spec("nicegui") is None:
         raise UsageError(_LIBRARY)
+    from rosz.web.middleware import AccessMiddleware
+
     server = _import_server()(
         node,
-        settings.host,
+        access.host,
         settings.port,
-        permission=Permission(access.permit, settings.read_only),
+        permission=PagePolicy(access.policy.permit, settings.read_only),
         bags=settings.bags,
-        guard=Guard(
-            access.password,
-            local=is_loopback(settings.host),
+        middleware=AccessMiddleware(
+            access.policy.password,
+            local=is_loopback(access.host),
             secure=access.tls is not None,
             most=settings.most_pages,
         ),

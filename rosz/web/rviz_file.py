@@ -9,9 +9,7 @@ from typing import Any
 import yaml
 
 from rosz.errors import RoszError, UsageError
-from rosz.web.scene import AXES, DEPTH, DESCRIPTION, GRID, ROBOT, TF, Look, Setup
-
-__all__ = ("read_rviz",)
+from rosz.web.scene import AXES, DEPTH, DESCRIPTION, GRID, ROBOT, TF, Look, SceneSetup
 
 _TOPIC = "Topic"
 _TOPICS = dict.fromkeys(
@@ -73,8 +71,8 @@ _ROBOTS = ("MotionPlanning", "PlanningScene", "RobotModel", "RobotState", "Traje
 _CLOUDS = ("LaserScan", "NormalDisplay", "PointCloud", "PointCloud2")
 
 
-def read_rviz(path: Path, resolve: Callable[[str], str]) -> tuple[Setup, list[str]]:
-    """Return the setup that a file of rviz describes, and what is not shown of it, with the reason.
+def read_rviz(path: Path, resolve: Callable[[str], str]) -> tuple[SceneSetup, list[str]]:
+    """Return the setup that a file of rviz describes, and the parts not shown, with reasons.
 
     Args:
         path: The file.
@@ -97,30 +95,30 @@ def read_rviz(path: Path, resolve: Callable[[str], str]) -> tuple[Setup, list[st
         ) from error
     looks: list[Look] = []
     left_out: list[str] = []
-    for one in listed:
-        kind = str(one.get("Class", "")).rpartition("/")[2]
+    for display in listed:
+        kind = str(display.get("Class", "")).rpartition("/")[2]
         try:
-            look = _look(one, kind, resolve)
+            look = _look(display, kind, resolve)
         except RoszError as error:
-            left_out.append(f"{_title(one)}: {error}")
+            left_out.append(f"{_title(display)}: {error}")
             continue
         why = _PARTLY.get(kind, "") if look is not None else _why_not(kind)
         if why:
-            left_out.append(f"{_title(one)}: {why}")
+            left_out.append(f"{_title(display)}: {why}")
         if look is not None and look not in looks:
             looks.append(look)
     frame = str(options.get("Fixed Frame", "")).removeprefix("/")
     above = "top" if view.endswith("TopDownOrtho") else "orbit"
-    return Setup("" if frame.startswith("<") else frame, tuple(looks), above), left_out
+    return SceneSetup("" if frame.startswith("<") else frame, tuple(looks), above), left_out
 
 
 def _displays(listed: list[Any]) -> Iterator[dict[str, Any]]:
-    for one in listed:
-        if isinstance(one, dict):
-            if str(one.get("Class", "")).endswith("/Group"):
-                yield from _displays(one.get("Displays") or [])
+    for display in listed:
+        if isinstance(display, dict):
+            if str(display.get("Class", "")).endswith("/Group"):
+                yield from _displays(display.get("Displays") or [])
             else:
-                yield one
+                yield display
 
 
 def _title(display: dict[str, Any]) -> str:
@@ -135,11 +133,7 @@ def _why_not(kind: str) -> str:
 
 
 def _look(display: dict[str, Any], kind: str, resolve: Callable[[str], str]) -> Look | None:
-    """Return the display of the view for one of rviz; None if there is none.
-
-    Raises:
-        InvalidName: The name of its topic is not legal.
-    """
+    """Return the display of the view for one of rviz; None if there is none."""
     visible = bool(display.get("Enabled", True))
     if kind == "Grid":
         cells = int(_number(display.get("Plane Cell Count"), 0.0))

@@ -13,23 +13,19 @@ import ssl
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import FastAPI
 from nicegui import Client, core, ui
 from nicegui import app as pages
 
+from rosz.access import PagePolicy
 from rosz.errors import TransportError
-from rosz.web.guard import Guard
-from rosz.web.model import Permission, System
+from rosz.node import Node
+from rosz.web.middleware import AccessMiddleware
+from rosz.web.model import System
 from rosz.web.pages import add_pages
 from rosz.worker import Worker, run_task
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("PageServer",)
 
 _START_SECONDS = 120.0
 _STOP_SECONDS = 1
@@ -38,7 +34,7 @@ _RECONNECT_SECONDS = 10.0
 _PING_SECONDS = 5.0
 _ANSWER_SECONDS = 20.0
 """Seconds within which a browser must answer a ping: one that draws much in 3D without a graphics
-processor, or that opens a page on a busy machine, answers late. It would lose what one fills in."""
+processor, or that opens a page on a busy machine, answers late. It would lose its forms."""
 _LOGGERS = ("nicegui", "uvicorn.error")
 _NICENESS = 10
 """Niceness of the threads of the server, so that nodes of the machine run before the pages."""
@@ -50,12 +46,7 @@ def _wait_for_answers() -> None:
 
 
 class _Server(uvicorn.Server):
-    """A server that sets an event when it has started.
-
-    Args:
-        config: Settings of the server.
-        ready: The event.
-    """
+    """A server that sets an event when it has started."""
 
     def __init__(self, config: uvicorn.Config, ready: threading.Event) -> None:
         super().__init__(config)
@@ -74,8 +65,8 @@ class PageServer:
         node: The node. It is not closed with the server.
         host: Address to listen at.
         port: Port to listen at; 0 for any.
-        permission: What the page may change.
-        guard: Who may open it.
+        permission: The changes that the page may make.
+        middleware: Refuses requests of those who may not open it.
         bags: Folder of the bags.
         tls: Settings of TLS; without them, links are not encrypted.
 
@@ -92,8 +83,8 @@ class PageServer:
         host: str,
         port: int,
         *,
-        permission: Permission,
-        guard: Guard,
+        permission: PagePolicy,
+        middleware: AccessMiddleware,
         bags: Path,
         tls: ssl.SSLContext | None = None,
     ) -> None:
@@ -113,7 +104,7 @@ class PageServer:
         )
         pages.on_startup(_wait_for_answers)
         config = uvicorn.Config(
-            guard.protect(app, _open_pages),
+            middleware.protect(app, _open_pages),
             log_level="warning",
             ws="websockets-sansio",
             timeout_graceful_shutdown=_STOP_SECONDS,
@@ -155,11 +146,7 @@ _ICON = (
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens.
-
-    Raises:
-        TransportError: The address is not of this machine, or the port is taken.
-    """
+    """Return a socket that listens."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

@@ -1,4 +1,4 @@
-"""The windows of ROS 1, rqt's and rviz, as pages: their names, and what they are started with.
+"""The windows of ROS 1, rqt's and rviz, as pages: their names and arguments.
 
 A page server that runs on this machine shows the page; without one, the window serves the pages
 itself until it ends. The packages in ``windows`` have a program for each.
@@ -6,27 +6,30 @@ itself until it ends. The packages in ``windows`` have a program for each.
 
 from __future__ import annotations
 
+import ast
 import importlib.util
+import json
 import os
 import re
 import sys
+import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
-from rosz.errors import RoszError, TransportError
-from rosz.introspect.survey import Survey
+from rosz.errors import RoszError, TransportError, UsageError
+from rosz.introspect import Survey
 from rosz.msgs.std_srvs.srv import Trigger
-from rosz.web.opening import PAGE_SERVICE, Settings, open_page
+from rosz.web.opening import PAGE_SERVICE, PageSettings, open_page
 
 if TYPE_CHECKING:
     from rosz.node import Node
 
-__all__ = ("WINDOWS", "main", "page_of")
-
 _REMAP = re.compile(r"[^=\s]*:=")
 _WAIT_SECONDS = 5.0
+_TOPIC_KEYS = ("topic", "topics")
+"""Keys under which plugins such as rqt_image_view and rqt_plot keep their topics."""
 _VALUED_BY_RVIZ = {"-d", "--display-config", "-f", "--fixed-frame", "-s", "--splash-screen"}
 _VALUED_BY_RVIZ |= {"--help-file", "--opengl"}
 _VALUED_BY_RQT = {"-b", "--qt-binding", "-p", "--perspective", "--perspective-file"}
@@ -44,11 +47,7 @@ def _plain(path: str) -> Page:
 
 def _topics(path: str, key: str) -> Page:
     """Return a function that makes the address of a page from the topics that are given."""
-
-    def page(words: Sequence[str], resolve: Resolve) -> str:
-        return _with_names(path, key, map(resolve, words))
-
-    return page
+    return lambda words, resolve: _with_names(path, key, map(resolve, words))
 
 
 def _with_names(path: str, key: str, names: Iterable[str]) -> str:
@@ -105,7 +104,7 @@ WINDOWS: dict[str, Page] = {
 
 
 def page_of(name: str, arguments: Sequence[str], resolve: Resolve) -> tuple[str, list[str]]:
-    """Return the address of the page of a window, without its host, and what it cannot show.
+    """Return the address of the page of a window, without its host, and the parts not shown.
 
     Args:
         name: Name of the window.
@@ -144,32 +143,61 @@ def _window_of(plugin: str) -> str:
 
 
 def _page_of_perspective(path: Path, resolve: Resolve) -> tuple[str, list[str]]:
-    """Return the page of the first plugin of a perspective, and those of the others.
-
-    Raises:
-        UsageError: The file cannot be read.
-        InvalidName: A name is not legal.
-    """
-    from rosz.web.perspective_file import read_perspective
-
-    plugins = read_perspective(path)
-    known = {one: _window_of(one) for one in plugins}
-    pages = [WINDOWS[known[one]](plugins[one], resolve) for one in plugins if known[one]]
-    left_out = [one for one in plugins if not known[one]]
+    """Return the page of the first plugin of a perspective, and those of the others."""
+    plugins = _read_perspective(path)
+    windows = {plugin: _window_of(plugin) for plugin in plugins}
+    pages = [
+        WINDOWS[windows[plugin]](plugins[plugin], resolve) for plugin in plugins if windows[plugin]
+    ]
+    left_out = [plugin for plugin in plugins if not windows[plugin]]
     notes = [f"and at {page}" for page in pages[1:]]
     if left_out:
         notes.append(f"not shown: {', '.join(left_out)}")
     return pages[0] if pages else "/", notes
 
 
+def _read_perspective(path: Path) -> dict[str, list[str]]:
+    """Return the plugins that a perspective shows, such as ``rqt_plot/Plot``, with their topics."""
+    try:
+        content = json.loads(path.read_text())
+        manager = content["groups"]["pluginmanager"]
+        running = _literal(manager["keys"]["running-plugins"])
+        return {
+            str(plugin): [
+                topic for number in numbers for topic in _topics_in(manager, str(plugin), number)
+            ]
+            for plugin, numbers in running.items()
+        }
+    except OSError as error:
+        raise UsageError(f"cannot read '{path}': {error}") from error
+    except (ValueError, SyntaxError, LookupError, TypeError, AttributeError) as error:
+        raise UsageError(
+            f"'{path}' is not a perspective of rqt: expected JSON with 'running-plugins'"
+        ) from error
+
+
+def _literal(entry: dict[str, Any]) -> Any:
+    """Return the value of an entry, which is written as Python writes it."""
+    return ast.literal_eval(entry["repr"])
+
+
+def _topics_in(manager: dict[str, Any], plugin: str, number: int) -> list[str]:
+    """Return the topics that an instance of a plugin shows; none for an unknown plugin."""
+    name = f"plugin__{plugin.replace('/', '__')}__{number}"
+    keys = manager.get("groups", {}).get(name, {}).get("groups", {}).get("plugin", {})
+    names: list[str] = []
+    for key in _TOPIC_KEYS:
+        entry = keys.get("keys", {}).get(key)
+        if entry is not None:
+            value = _literal(entry)
+            names += [value] if isinstance(value, str) else value
+    return [text for text in map(str, names) if text.strip("/ ")]
+
+
 def _page_of_rviz(
     words: Sequence[str], options: dict[str, str], resolve: Resolve
 ) -> tuple[str, list[str]]:
-    """Return the view in space that rviz is started with, and what it does not show.
-
-    Raises:
-        UsageError: The file cannot be read.
-    """
+    """Return the view in space that rviz is started with, and the parts not shown."""
     file = options.get("-d", options.get("--display-config", words[0] if words else ""))
     fixed = options.get("-f", options.get("--fixed-frame", ""))
     if not file:
@@ -199,11 +227,7 @@ def main(name: str) -> None:
 
 
 def _show(name: str, arguments: Sequence[str]) -> None:
-    """Show the page until the node is shut down.
-
-    Raises:
-        RoszError: The page cannot be shown.
-    """
+    """Show the page until the node is shut down."""
     if importlib.util.find_spec("nicegui") is None or importlib.util.find_spec("numpy") is None:
         raise TransportError("the page needs libraries: pip install 'rosz[web]'")
     from rosz.node import Node
@@ -217,11 +241,11 @@ def _show(name: str, arguments: Sequence[str]) -> None:
         address, server = _find_page(node), None
         if not address:
             try:
-                server, lines = open_page(node, Settings())
+                server, lines = open_page(node, PageSettings())
             except TransportError:  # perhaps another window began just now
                 address = _find_page(node, _WAIT_SECONDS)
                 if not address:
-                    server, lines = open_page(node, Settings(port=0))
+                    server, lines = open_page(node, PageSettings(port=0))
             if server is not None:
                 address, notes = lines[0], [*notes, *lines[1:]]
         _open(f"{address.rstrip('/')}{path}", notes)
@@ -234,16 +258,11 @@ def _show(name: str, arguments: Sequence[str]) -> None:
 
 
 def _find_page(node: Node, seconds: float = 0.0) -> str:
-    """Return the address of a page server of this machine; empty if there is none.
-
-    Args:
-        node: The node that looks for it.
-        seconds: Time to wait for one.
-    """
+    """Return the address of a page server of this machine; empty if none comes in time."""
 
     def servers() -> list[str]:
         view = node.context.graph.refresh()
-        processes = {(one.zid, one.node_id): one for one in view.processes()}
+        processes = {(token.zid, token.node_id): token for token in view.processes()}
         survey = Survey(node.context.domain, view, processes)
         return [
             token.name
@@ -253,12 +272,10 @@ def _find_page(node: Node, seconds: float = 0.0) -> str:
             if survey.host(token) == node.process.host
         ]
 
-    import time
-
     deadline = time.monotonic() + seconds
-    while not (found := servers()) and time.monotonic() < deadline:
+    while not (pages := servers()) and time.monotonic() < deadline:
         time.sleep(0.2)
-    for service in found:
+    for service in pages:
         with node.client(service, Trigger, timeout=_WAIT_SECONDS) as client:
             try:
                 return str(client.call(Trigger.Request()).message)

@@ -2,8 +2,7 @@
 
 from rosz.wire.attachment import pack_attachment, read_attachment
 from rosz.wire.endpoint import Endpoint
-from rosz.wire.gid import gid
-from rosz.wire.session_ids import FOREIGN_DIGITS, host_number, id_prefix, is_rosz_id
+from rosz.wire.ids import FOREIGN_DIGITS, gid, host_number, id_prefix, is_rosz_id
 from rosz.wire.tokens import (
     NO_HASH,
     OWN_SPACE,

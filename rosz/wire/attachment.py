@@ -10,8 +10,6 @@ from struct import Struct
 
 from rosz.errors import DecodeError
 
-__all__ = ("pack_attachment", "read_attachment")
-
 _GID_SIZE = 16
 _LAYOUT = Struct("<qqB16s")
 _OLD_SIZE = 77

@@ -12,8 +12,6 @@ import msgspec
 
 from rosz.errors import UsageError
 
-__all__ = ("Endpoint",)
-
 _MAX_PORT: Final = 65535
 _WITH_PORT: Final = frozenset({"tcp", "udp", "tls", "quic", "ws"})
 _PROTOCOLS: Final = _WITH_PORT | {"unixsock-stream", "unixpipe", "vsock", "serial"}

@@ -23,32 +23,6 @@ import msgspec
 from rosz.errors import DecodeError
 from rosz.qos import FOREVER, QoS
 
-__all__ = (
-    "NO_HASH",
-    "OWN_SPACE",
-    "SPACE",
-    "Kind",
-    "ProcessToken",
-    "Token",
-    "clients_below_key",
-    "dds_type",
-    "dropped_key",
-    "entities_key",
-    "entity_key",
-    "format_process",
-    "format_qos",
-    "format_token",
-    "node_key",
-    "nodes_key",
-    "own_key",
-    "parse_process",
-    "parse_qos",
-    "parse_token",
-    "processes_key",
-    "ros_type",
-    "tokens_key",
-)
-
 T = TypeVar("T")
 
 SPACE = "@ros2_lv"
@@ -190,7 +164,7 @@ def nodes_key(domain: int, zid: str = "*") -> str:
 
 
 def _chunk(name: str) -> str:
-    """Return a chunk that matches a name; what no token can have becomes something else."""
+    """Return a chunk that matches a name; characters that no token has become others."""
     return _FORBIDDEN.sub("_", name.replace("/", "%")) or "%"
 
 
@@ -286,7 +260,7 @@ class ProcessToken(msgspec.Struct, frozen=True):
 
 
 def dropped_key(domain: int, zid: str = "*") -> str:
-    """Return the key of what the entities of one session have dropped, or of all sessions."""
+    """Return the key of the dropped samples of one session, or of all sessions."""
     return own_key(domain, "dropped", zid)
 
 

@@ -1,24 +1,44 @@
-"""The packages of a workspace: create them, and check them.
+"""The packages of a workspace: create them, check them, and write files from them.
 
 Nothing is built here, so `check` finds the errors that a build would report. May import anything up
-to ``rosz.ros1``.
+to ``rosz.ros1``. The names are imported on first use, since commands have to start fast.
 """
 
-from rosz.workspace.check import Checked, check, find_packages
-from rosz.workspace.create import create, write_setup
-from rosz.workspace.migrate import Migration, Program, migrate
-from rosz.workspace.problem import Problem
+from __future__ import annotations
+
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False  # typing takes longer to import than everything else here
+if TYPE_CHECKING:
+    from rosz.workspace.checks import Checked, check, find_packages
+    from rosz.workspace.creation import create, write_setup
+    from rosz.workspace.editor import editor_folder, write_stubs
+    from rosz.workspace.generate import Generator
+    from rosz.workspace.migration import Migration, migrate
+    from rosz.workspace.problem import Problem
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "checks": "Checked check find_packages",
+            "creation": "create write_setup",
+            "editor": "editor_folder write_stubs",
+            "generate": "Generator",
+            "migration": "Migration migrate",
+            "problem": "Problem",
+        },
+    )
 
 __all__ = (
     "Checked",
+    "Generator",
     "Migration",
     "Problem",
-    "Program",
     "check",
     "create",
+    "editor_folder",
     "find_packages",
     "migrate",
     "write_setup",
+    "write_stubs",
 )
-
-PUBLIC_MODULES = ("editor", "generate")

@@ -1,4 +1,4 @@
-"""Writes what editors and type checkers need to know ROS 1's names.
+"""Writes stubs by which editors and type checkers know ROS 1's names.
 
 A folder in the user's cache has each name that scripts can import: stubs that name rosz's own
 modules, generated modules of the messages of the workspace, and links to the Python modules that
@@ -17,11 +17,9 @@ import msgspec
 from rosz.environment import Environment, package_index
 from rosz.errors import RoszError
 from rosz.packages import PackageIndex
-from rosz.ros1.modules import ELSEWHERE, MODULES, SUBMODULES
+from rosz.ros1.modules import MODULES
 from rosz.ros1.python_setup import Offers, is_module
 from rosz.typestore import Kind, TypeStore, shipped_packages, shipped_types
-
-__all__ = ("Stubs", "editor_folder", "write_stubs")
 
 _SOURCE = Path(__file__).parents[1]
 _KINDS: tuple[Kind, ...] = ("msg", "srv", "action")
@@ -34,7 +32,7 @@ class Stubs(msgspec.Struct, frozen=True):
     Attributes:
         folder: The folder, for the path of editors and type checkers.
         modules: Number of modules that can be imported from there, without those inside others.
-        faults: Packages whose types have a mistake, with what is wrong; they have no stubs.
+        faults: Packages whose types have a mistake, with the reason; they have no stubs.
     """
 
     folder: str
@@ -70,25 +68,30 @@ def _of_rosz() -> Iterator[tuple[str, str]]:
     built = {
         name: "".join(
             f"from rosz.{home} import {own or public} as {public}\n"
-            for home, names in homes.items()
+            for home, names in module.names.items()
             for public, _, own in (each.partition("=") for each in names.split())
         )
-        for name, homes in SUBMODULES.items()
+        for name, module in MODULES.items()
+        if not module.home
     }
-    real = {name: text for root in (*MODULES, *ELSEWHERE) for name, text in _modules_of(root)}
+    real = {
+        name: text
+        for root, module in MODULES.items()
+        if module.home
+        for name, text in _modules_of(root, module.home)
+    }
     whole = {**real, **{name: text + real.get(name, "") for name, text in built.items()}}
     parents = {name.rpartition(".")[0] for name in whole if "." in name}
     for name in sorted({*whole, *parents}):
-        inside = sorted(one for one in whole if one.rpartition(".")[0] == name)
-        last = (one.rpartition(".")[2] for one in inside)
-        text = whole.get(name, "") + "".join(f"from . import {one} as {one}\n" for one in last)
+        parts = [each.rpartition(".") for each in sorted(whole)]
+        inside = [last for parent, _, last in parts if parent == name]
+        text = whole.get(name, "") + "".join(f"from . import {last} as {last}\n" for last in inside)
         path = name.replace(".", "/")
         yield (f"{path}/__init__.py" if inside else f"{path}.py"), text
 
 
-def _modules_of(root: str) -> Iterator[tuple[str, str]]:
+def _modules_of(root: str, own: str) -> Iterator[tuple[str, str]]:
     """Yield the modules of rosz that have a name of ROS 1, with their stubs."""
-    own = ELSEWHERE.get(root, f"ros1.{root}")
     place = _SOURCE / own.replace(".", "/")
     files = sorted(place.rglob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
     for file in files:
@@ -132,10 +135,9 @@ def _importing(kinds: list[Kind]) -> str:
 
 
 def _of_offers(index: PackageIndex, environment: Environment) -> Iterator[tuple[str, Path]]:
-    """Yield links to the Python modules of packages."""
-    known = {*MODULES, *ELSEWHERE, *shipped_packages()}
+    provided = {*MODULES, *shipped_packages()}
     offers = Offers(index, environment.home / "rosz" / "modules.json")
-    for name in sorted({*offers.names()} - known):
+    for name in sorted({*offers.names()} - provided):
         path = offers.find(name)
         if path is None:
             continue
@@ -150,7 +152,7 @@ def _of_offers(index: PackageIndex, environment: Environment) -> Iterator[tuple[
 def _clean(folder: Path, written: set[Path], linked: set[Path]) -> None:
     """Remove the files and links of a folder that are not wanted, and empty folders."""
     for parent, inside, names in os.walk(folder, topdown=False):
-        # A link to a folder is removed; what it leads to belongs to the user.
+        # A link to a folder is removed; the folder itself belongs to the user.
         for name in (*names, *inside):
             path = Path(parent, name)
             if path.is_symlink():

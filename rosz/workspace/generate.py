@@ -10,8 +10,6 @@ from rosz.idl.generate import MARKER, shipped_sources, stale, write
 from rosz.packages import MANIFEST, Package, PackageIndex, manifest_of
 from rosz.typestore import TypeStore, shipped_packages
 
-__all__ = ("Generator",)
-
 _Sources = dict[Path, dict[str, str]]
 """Sources by folder and file name."""
 
@@ -32,7 +30,7 @@ class Generator:
         self._cwd = cwd
 
     def stale(self, words: list[str]) -> list[str]:
-        """Return the differences between the modules on disk and what they should be.
+        """Return the differences between the modules on disk and fresh ones.
 
         Args:
             words: Names or folders of packages. If empty, the package around the working folder,
@@ -43,8 +41,8 @@ class Generator:
             NotFoundError: A package does not exist, or has no definitions.
             UsageError: No package is given, and the working folder is in none.
         """
-        found = self._sources(words)
-        return [line for folder, files in found.items() for line in stale(files, folder)]
+        sources = self._sources(words)
+        return [line for folder, files in sources.items() for line in stale(files, folder)]
 
     def write(self, words: list[str]) -> list[Path]:
         """Write the modules, and return their files; arguments and errors as those of `stale`.
@@ -52,13 +50,18 @@ class Generator:
         Raises:
             UsageError: Also if a file that was not generated is in the way.
         """
-        found = self._sources(words)
-        for folder, files in found.items():
+        sources = self._sources(words)
+        for folder, files in sources.items():
             for name in files:
-                _check_generated(folder / name)
-        for folder, files in found.items():
+                file = folder / name
+                if file.is_file() and not file.read_text("utf-8").startswith(MARKER):
+                    raise UsageError(
+                        f"'{file}' was not generated, and is not overwritten; choose a folder"
+                        " with -o"
+                    )
+        for folder, files in sources.items():
             write(files, folder)
-        return [folder / name for folder, files in found.items() for name in sorted(files)]
+        return [folder / name for folder, files in sources.items() for name in sorted(files)]
 
     def _sources(self, words: list[str]) -> _Sources:
         source_tree = self._cwd / "interfaces", self._cwd / "rosz" / "msgs"
@@ -106,10 +109,3 @@ def _sources(index: PackageIndex, name: str) -> dict[str, dict[str, str]]:
         hint = f"; rosz brings 'rosz.msgs.{name}'" if name in shipped_packages() else ""
         text = f"package '{name}' has no types of its own that modules could be made of{hint}"
         raise NotFoundError(text) from error
-
-
-def _check_generated(file: Path) -> None:
-    if file.is_file() and not file.read_text("utf-8").startswith(MARKER):
-        raise UsageError(
-            f"'{file}' was not generated, and is not overwritten; choose a folder with -o"
-        )

@@ -10,8 +10,6 @@ import msgspec
 
 from rosz.errors import LaunchFileError, PackageNotFound, SourceError
 
-__all__ = ("REMEDY", "Problem", "error", "from_absence", "from_error", "warning")
-
 _ABSENT = re.compile(r"package '([^']+)' not found")
 _MISTYPED = "did you mean"
 REMEDY = "; run: "
@@ -25,9 +23,9 @@ class Problem(msgspec.Struct, frozen=True, order=True):
         path: Path of the file or folder.
         line: 1-based line, or 0 for the whole file.
         column: 1-based column, or 0 if unknown.
-        level: ``error``, or ``warning`` for what still works with rosz.
-        text: Description of the problem, and what to do.
-        missing: Name of the package that is not there, which is all that is wrong; or empty.
+        level: ``error``, or ``warning`` if it still works with rosz.
+        text: Description of the problem, and a remedy.
+        missing: Name of the package whose absence is the only fault; or empty.
     """
 
     path: str

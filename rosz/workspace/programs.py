@@ -15,27 +15,18 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 
 from rosz.errors import LaunchFileError, NotFoundError, PackageNotFound, RoszError
 from rosz.launch.plan import NodePlan, SystemContext, describe_args, plan
-from rosz.launch.run.command import locate
+from rosz.launch.run import locate
 from rosz.packages import Package, PackageIndex, is_python
 from rosz.ros1.python2 import explain
 from rosz.workspace.problem import Problem, error, from_absence, from_error, warning
 
-__all__ = (
-    "check_cmake",
-    "check_configs",
-    "check_entry_points",
-    "check_launches",
-    "check_scripts",
-    "compiled_programs",
-)
-
 _SCRIPT_FOLDERS = frozenset({"scripts", "script", "nodes", "node", "bin", "test", "tests"})
 _SKIPPED_FOLDERS = frozenset({"__pycache__", "node_modules", "build", "devel", "install"})
+# The first line and the magic number of a binary; files may be large.
 _HEAD_BYTES = 4096
 _BINARY = b"\x7fELF"
 _EXECUTABLE = re.compile(
@@ -157,11 +148,11 @@ def compiled_programs(folder: Path) -> dict[str, int]:
 
 def check_cmake(folder: Path) -> Iterator[Problem]:
     """Yield a problem that names the C++ programs of a package, which rosz does not build."""
-    found = compiled_programs(folder)
-    if found:
-        names = ", ".join(found)
+    programs = compiled_programs(folder)
+    if programs:
+        names = ", ".join(programs)
         text = f"rosz does not build C++ programs, and has no C++ API: {names}"
-        yield warning(folder / "CMakeLists.txt", text, min(found.values()))
+        yield warning(folder / "CMakeLists.txt", text, min(programs.values()))
 
 
 def check_configs(
@@ -179,8 +170,7 @@ def check_configs(
             continue  # another kind of configuration
         if not os.access(file, os.X_OK):
             yield warning(file, f"not executable, which catkin requires; run: chmod +x {file}")
-        known = find_spec("rosz.ros1.dynamic_reconfigure") is not None
-        if known and str(file) not in wrong:
+        if str(file) not in wrong:
             yield from _run_config(file, environ)
 
 
@@ -205,19 +195,13 @@ def _run_config(file: Path, environ: Mapping[str, str]) -> Iterator[Problem]:
             return
     if done.returncode:
         lines = [int(line) for path, line in _FRAME.findall(done.stderr) if path == str(file)]
-        said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
-        yield error(file, _without_place(said[-1], file), lines[-1] if lines else 0)
-
-
-def _without_place(text: str, file: Path) -> str:
-    return re.sub(rf"^(ERROR: )?({re.escape(str(file))}(:\d+)*: )?", "", text)
+        output = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        text = re.sub(rf"^(ERROR: )?({re.escape(str(file))}(:\d+)*: )?", "", output[-1])
+        yield error(file, text, lines[-1] if lines else 0)
 
 
 class _DryContext(SystemContext):
-    """A context that runs no commands."""
-
-    def run(self, command: Sequence[str]) -> bytes:  # noqa: ARG002  # what it overrides
-        """Return an empty output."""
+    def run(self, command: Sequence[str]) -> bytes:  # noqa: ARG002  # as in the base class
         return b""
 
 
@@ -234,19 +218,19 @@ def check_launches(
     context = _DryContext(index, environ, folder, lambda base: f"{base}_1")
     for file in sorted({file for pattern in _LAUNCH_PATTERNS for file in folder.rglob(pattern)}):
         faults: list[LaunchFileError] = []
-        found = None
+        planned = None
         try:
             # A file with required args is meant to be included by another one.
             if all(arg.default is not None for arg in describe_args([file], {}, context)):
-                found = plan([file], {}, context, faults=faults)
+                planned = plan([file], {}, context, faults=faults)
         except RoszError as fault:
             yield from_error(fault, file)
         yield from (from_error(fault, file) for fault in faults)
-        if found is not None:
-            for notice in found.warnings:
+        if planned is not None:
+            for notice in planned.warnings:
                 place = notice.place
                 yield warning(Path(place.file), notice.text, place.line, place.column)
-            for node in found.processes:
+            for node in planned.processes:
                 yield from _check_node(node, index, lambda path: path.is_relative_to(folder))
 
 

@@ -13,10 +13,10 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 from rosz.actions import (
-    ActionClient,
-    ActionServer,
+    ActionlibClient,
+    ActionlibClientGoal,
+    ActionlibServer,
     ActionTypes,
-    ClientGoal,
     SimpleActionServer,
 )
 from rosz.errors import UsageError
@@ -52,13 +52,13 @@ class World:
 
     def server(self, execute: Any = None) -> SimpleActionServer:
         server = SimpleActionServer(
-            ActionServer(self.server_node, "count", self.count.action), execute
+            ActionlibServer(self.server_node, "count", self.count.action), execute
         )
         server.start()
         return server
 
-    def client(self) -> ActionClient:
-        client = ActionClient(self.client_node, "count", self.count.action)
+    def client(self) -> ActionlibClient:
+        client = ActionlibClient(self.client_node, "count", self.count.action)
         assert client.wait_for_server(TIMEOUT)
         return client
 
@@ -80,7 +80,7 @@ def test_a_goal_from_start_to_end(world: World) -> None:
 
     server = world.server(execute)
 
-    def on_done(goal: ClientGoal) -> None:
+    def on_done(goal: ActionlibClientGoal) -> None:
         events.append(("done", goal.status.status, goal.result.sum))
 
     def on_feedback(feedback: Any) -> None:
@@ -145,7 +145,7 @@ def test_cancelling(world: World, everything: bool) -> None:
 def test_a_forgotten_goal_is_not_followed(world: World) -> None:
     server = world.server()
     accepted = threading.Event()
-    calls: list[ClientGoal] = []
+    calls: list[ActionlibClientGoal] = []
 
     def accept() -> None:
         server.accept_new_goal()
@@ -180,11 +180,11 @@ def test_a_goal_unknown_to_a_restarted_server_is_lost(world: World) -> None:
 SERVER = """
     import threading
     import rosz
-    from rosz.actions import ActionServer, SimpleActionServer
+    from rosz.actions import ActionlibServer, SimpleActionServer
 
     with rosz.Node("other") as node:
         action = node.context.types.message("counting/CountAction")
-        server = SimpleActionServer(ActionServer(node, "count", action))
+        server = SimpleActionServer(ActionlibServer(node, "count", action))
         server.action_server.on_goal = lambda goal: goal.accept()
         server.start()
         print("ready", flush=True)
@@ -228,7 +228,7 @@ def test_a_server_is_ready_once_it_has_published_its_status(world: World) -> Non
     node.subscription("count/goal", types.action_goal, lambda _: None)
     node.subscription("count/cancel", GoalID, lambda _: None)
     status = node.publisher("count/status", GoalStatusArray)
-    client = ActionClient(world.client_node, "count", world.count.action)
+    client = ActionlibClient(world.client_node, "count", world.count.action)
     for publisher in (status, result):
         publisher.wait_for_subscribers(1, TIMEOUT)
     assert not client.wait_for_server(0.5)
@@ -243,7 +243,7 @@ def test_a_server_is_ready_once_it_has_published_its_status(world: World) -> Non
 
 
 def test_a_late_client_need_not_wait_for_the_next_status(world: World) -> None:
-    server = ActionServer(world.server_node, "count", world.count.action, status_frequency=0)
+    server = ActionlibServer(world.server_node, "count", world.count.action, status_frequency=0)
     server.start()
     world.client()
     server.stop()
@@ -280,7 +280,7 @@ def test_on_active_returns_before_on_done(world: World) -> None:
         leave.wait(TIMEOUT)
         events.append("active")
 
-    client = ActionClient(world.client_node, "count", world.count.action)
+    client = ActionlibClient(world.client_node, "count", world.count.action)
     goal = client.send(
         world.count.goal(1), on_active=on_active, on_done=lambda _: events.append("done")
     )
@@ -298,7 +298,7 @@ def test_on_active_returns_before_on_done(world: World) -> None:
 
 
 def test_waiting_has_limits(world: World) -> None:
-    client = ActionClient(world.client_node, "count", world.count.action)
+    client = ActionlibClient(world.client_node, "count", world.count.action)
     assert not client.wait_for_server(0.01)
     assert not client.send(world.count.goal(1)).wait(0.01)
 
@@ -325,7 +325,7 @@ def test_on_active_may_wait_for_the_end(world: World, quick: bool) -> None:
         begun.set()
         events.append(f"active {sent.get().wait(TIMEOUT)}")
 
-    sent: SimpleQueue[ClientGoal] = SimpleQueue()
+    sent: SimpleQueue[ActionlibClientGoal] = SimpleQueue()
     goal = world.client().send(
         count.goal(1), on_done=lambda _: events.append("done"), on_active=on_active
     )

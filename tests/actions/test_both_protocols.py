@@ -11,9 +11,16 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network, eventually
 
-from rosz.actions import ActionClient, ActionServer, ClientGoal, CommState, SimpleActionServer
+from rosz.actions import (
+    ActionlibClient,
+    ActionlibClientGoal,
+    ActionlibServer,
+    CommState,
+    GoalState,
+    SimpleActionServer,
+    list_actions,
+)
 from rosz.errors import ActionError, GoalFailed, GoalRejected
-from rosz.introspect.actions import list_actions
 from rosz.introspect.services import list_services
 from rosz.introspect.topics import list_topics
 from rosz.msgs.action_msgs.msg import GoalInfo
@@ -21,7 +28,6 @@ from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus
 from rosz.msgs.actionlib_tutorials.action import Fibonacci
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
-from rosz.node.goals import GoalState
 
 
 class World:
@@ -50,15 +56,15 @@ class World:
 
         return self.other.action_server("fib", Fibonacci, execute, **options)
 
-    def ros1_client(self) -> ActionClient:
-        client = ActionClient(self.one, "fib", self.action)
+    def ros1_client(self) -> ActionlibClient:
+        client = ActionlibClient(self.one, "fib", self.action)
         assert client.wait_for_server(TIMEOUT)
         return client
 
-    def ros1_server(self, **callbacks: Any) -> ActionServer:
+    def ros1_server(self, **callbacks: Any) -> ActionlibServer:
         """A server of actionlib; it hands goals to the test."""
         callbacks = {"on_goal": self.arrived.put, **callbacks}
-        server = ActionServer(self.other, "fib", self.action, **callbacks)
+        server = ActionlibServer(self.other, "fib", self.action, **callbacks)
         server.start()
         return server
 
@@ -79,7 +85,7 @@ def is_canceling(goal: Any) -> bool:
     return goal.status is GoalState.CANCELING
 
 
-def reaches(goal: ClientGoal, status: int) -> None:
+def reaches(goal: ActionlibClientGoal, status: int) -> None:
     eventually(lambda: goal.status.status == status, f"status {status}")
 
 
@@ -300,7 +306,7 @@ def test_the_simple_server_lets_a_newer_goal_of_either_protocol_go_first(world: 
         else:
             server.set_preempted(world.result([goal.order]))
 
-    server = SimpleActionServer(ActionServer(world.other, "fib", world.action), execute)
+    server = SimpleActionServer(ActionlibServer(world.other, "fib", world.action), execute)
     server.start()
     old, new = world.ros2_client(), world.ros1_client()
     first = old.send(Fibonacci.Goal(1))

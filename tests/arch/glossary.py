@@ -9,6 +9,7 @@ from __future__ import annotations
 __all__ = ("AVOIDED", "WORDS")
 
 WORDS = {
+    "access policy": "who may connect to a bridge or the page, and what its clients may do",
     "anti-entropy": "comparing replicas and exchanging the writes that differ",
     "attachment": "sequence number, time and GID beside each sample (rmw_zenoh)",
     "client": "the calling end of a service; a Zenoh session of one router",
@@ -17,7 +18,6 @@ WORDS = {
     "decoder": "what turns samples of one type into messages",
     "digest": "a hash of all writes of a replica",
     "domain": "ROS_DOMAIN_ID; domains do not see each other",
-    "elder": "one of the few replicas that follow all others, so that others need not",
     "endpoint": "a Zenoh address, such as tcp/robot1:7447",
     "entity": "a publisher, subscription, service or client of a node (rmw_zenoh)",
     "GID": "16 bytes that identify an entity",
@@ -32,9 +32,11 @@ WORDS = {
     "mesh": "peers that are all linked to each other",
     "namespace": "the part of a name before its last slash",
     "node": "a named participant",
+    "outgoing queue": "the messages that wait to be sent to one client of a bridge",
     "package": "a folder with a package.xml",
     "parameter": "a named value of the parameter store",
     "peer": "a session that links to all others, without a router",
+    "permit": "the permissions of one holder of a key, by the rules of a machine",
     "plan": "what launch files amount to: nodes, parameters, machines",
     "program": "a script with its command line and threads; one of several in a container",
     "querier, query, reply": "asking a queryable (Zenoh)",
@@ -44,6 +46,7 @@ WORDS = {
     "replica": "a copy of the parameter store that acknowledges writes",
     "router": "a session that forwards between others; rosz core",
     "sample": "a message as bytes, with its key and attachment (Zenoh)",
+    "seed": "one of the few replicas that follow all others, so that others need not",
     "session": "a connection to the network (Zenoh)",
     "spec": "a parsed definition of a type",
     "stamp": "a time of the hybrid logical clock, which no two writes share",
@@ -56,6 +59,7 @@ WORDS = {
 }
 
 AVOIDED = {
+    "admission": "access policy",
     "ask": "query",
     "asker": "querier",
     "asking": "query",
@@ -64,7 +68,10 @@ AVOIDED = {
     "census": "process tree",
     "contend": "takeover",
     "dress": "format",
+    "elder": "seed",
+    "entrance": "access policy",
     "face": "entity",
+    "gate": "access policy",
     "hail": "connect",
     "hub": "router",
     "hush": "drop peer",
@@ -75,6 +82,8 @@ AVOIDED = {
     "lingering": "close links",
     "lookout": "detector",
     "meet": "receive, connect",
+    "outbox": "outgoing queue",
+    "outlet": "publisher",
     "panel": "status server",
     "parting": "close links",
     "patience": "timeout",
@@ -84,6 +93,7 @@ AVOIDED = {
     "saver": "storage",
     "settle": "compare, become ready",
     "settling": "mesh readiness",
+    "standstill": "suspension",
     "tell": "notify, report",
     "told": "notified",
     "trouble": "problem",

@@ -17,6 +17,7 @@ __all__ = (
     "floor",
     "imports",
     "is_package",
+    "package_of",
     "path_of",
 )
 
@@ -29,11 +30,13 @@ FLOORS = {
     "rosz.__main__": 9,
     "rosz.script": 9,
     "rosz.errors": 0,
+    "rosz.lazy": 0,
     "rosz.names": 0,
     "rosz.remap": 0,
     "rosz.time": 0,
     "rosz.qos": 0,
     "rosz.packages": 0,
+    "rosz.queue": 0,
     "rosz.message": 0,
     "rosz.replacements": 0,
     "rosz.idl": 1,
@@ -49,31 +52,22 @@ FLOORS = {
     "rosz.interrupts": 3,
     "rosz.lifecycle": 3,
     "rosz.security": 3,
-    "rosz.security.rules": 1,
-    "rosz.security.access": 1,
-    "rosz.security.reading": 1,
     "rosz.session": 3,
     "rosz.graph": 4,
     "rosz.params.replica": 4,
-    "rosz.params.remote": 4,
-    "rosz.params.api": 5,
     "rosz.node": 5,
+    "rosz.access": 6,
     "rosz.actions": 6,
-    "rosz.bags": 6,
-    "rosz.bags.images": 7,
+    "rosz.bags": 7,
     "rosz.diagram": 6,
+    "rosz.images": 6,
     "rosz.introspect": 6,
     "rosz.launch.run": 6,
     "rosz.reconfigure": 6,
     "rosz.transforms": 6,
     "rosz.bridges": 7,
-    "rosz.bridges.fleet.plan": 1,
     "rosz.bridges.foxglove.protocol": 1,
-    "rosz.bridges.ros1.calls": 1,
-    "rosz.bridges.ros1.frames": 1,
-    "rosz.bridges.ros1.registry": 1,
-    "rosz.bridges.websocket.operations": 1,
-    "rosz.bridges.websocket.plain": 1,
+    "rosz.bridges.rosbridge.operations": 1,
     "rosz.doctor": 7,
     "rosz.programs": 7,
     "rosz.ros1": 7,
@@ -122,6 +116,18 @@ def path_of(module: str) -> Path:
 def is_package(module: str) -> bool:
     """Tell whether a module is the ``__init__`` of a package."""
     return _PATHS[module].name == "__init__.py"
+
+
+# Parts of packages that stand on floors of their own: they count as packages.
+_HALVES = ("rosz.launch.plan", "rosz.launch.run", "rosz.params.replica")
+
+
+def package_of(module: str) -> str:
+    """Return the package of a module: a name below ``rosz``, or a half of one of them."""
+    for half in _HALVES:
+        if module == half or module.startswith(half + "."):
+            return half
+    return ".".join(module.split(".")[:2])
 
 
 def floor(module: str) -> int:

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from bags.messages import MESSAGES
 from rosz.bags import Attachment, Channel, McapWriter, open_reader
-from rosz.bags.ros1_form import to_cdr
+from rosz.bags.formats.ros1_form import to_cdr
 from rosz.cli.main import run
 from rosz.qos import FOREVER, LATCHED, SENSOR_DATA, QoS
 from rosz.typestore import TypeStore

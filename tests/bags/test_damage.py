@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import random
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from network import repeats
 
 from rosz.bags import Channel, Storage, create_writer, open_reader
-from rosz.bags.repair import recover
-from rosz.bags.ros1_form import to_ros1
+from rosz.bags.edit.repair import recover
+from rosz.bags.formats.ros1_form import to_ros1
+from rosz.bags.formats.rosbag2_writer import Rosbag2Writer
 from rosz.cli.main import run
 from rosz.errors import BagError
 from rosz.msgs.std_msgs.msg import String
@@ -158,3 +161,24 @@ def test_a_place_that_cannot_be_written_is_named(
         assert "cannot create it: Not a directory" in capsys.readouterr().err
     assert run(["bag", "merge", path, "-o", f"{blocked}/{name}"]) == 1
     assert run(["bag", "split", path, "-o", f"{blocked}/{name}", "--size", "1"]) == 1
+
+
+def test_damaged_sqlite_is_read_or_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Rosbag2Writer(tmp_path / "whole", storage="sqlite3") as writer:
+        handle = writer.add(Channel("/chatter", "std_msgs/msg/String", definition="string data\n"))
+        for number in range(1000):
+            writer.write(handle, 1000 + number, String(data=f"hello {number}").to_cdr())
+    whole = (tmp_path / "whole" / "whole_0.db3").read_bytes()
+    damaged, target = tmp_path / "x.db3", tmp_path / "o.mcap"
+    for seed in range(repeats(40, 400)):
+        rng = random.Random(seed)
+        data = bytearray(whole)
+        for _ in range(rng.randrange(1, 20)):
+            data[rng.randrange(rng.choice((len(data), 4096, 4096 * 8)))] = rng.randrange(256)
+        damaged.write_bytes(data)
+        for words in (["info"], ["check"], ["cat"], ["filter", str(target), "m.data != ''"]):
+            target.unlink(missing_ok=True)
+            assert run(["bag", words[0], str(damaged), *words[1:]]) in {0, 1}, (seed, words)
+            assert "Traceback" not in capsys.readouterr().err, (seed, words)

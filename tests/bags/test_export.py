@@ -16,7 +16,7 @@ from pyarrow import parquet
 
 import rosz.bags
 from bags.messages import MESSAGES
-from rosz.bags.tables import file_names
+from rosz.bags.export.tables import file_names
 from rosz.cli.main import run
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Point, PointStamped, TransformStamped
@@ -84,7 +84,7 @@ def test_csv_has_the_same_columns_in_every_row(bag: str, tmp_path: Path) -> None
 def test_parquet_has_typed_columns(
     bag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosz.bags.tables._GROUP_ROWS", 15)
+    monkeypatch.setattr("rosz.bags.export.tables._GROUP_ROWS", 15)
     assert run(words(bag, tmp_path, "--format", "parquet")) == 0
     scan = parquet.read_table(tmp_path / "scan.parquet")
     assert str(scan.schema.field("ranges").type) == "list<element: float>"
@@ -125,6 +125,13 @@ def test_every_type_becomes_a_table(tmp_path: Path, form: str) -> None:
 def test_names_of_files_are_unique() -> None:
     assert file_names(["/a/b", "/c/d"]) == {"/a/b": "a_b", "/c/d": "c_d"}
     assert file_names(["/a/b", "/a_b", "/x"]) == {"/a/b": "a%2Fb", "/a_b": "a_b", "/x": "x"}
+
+
+def test_a_topic_with_nul_is_exported(tmp_path: Path) -> None:
+    with rosz.bags.open(tmp_path / "a.mcap", "w") as made:
+        made.write("/a\0b", String(data="x"), 5)
+    assert run(["bag", "export", str(tmp_path / "a.mcap"), str(tmp_path / "out")]) == 0
+    assert [file.name for file in (tmp_path / "out").iterdir()] == ["a%00b.csv"]
 
 
 def test_what_exists_is_not_replaced(
@@ -285,7 +292,7 @@ def test_plots_are_drawn(bag: str, tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_curves_have_the_values_of_the_bag(bag: str) -> None:
-    from rosz.bags.plotting import find_curves, read_curves
+    from rosz.bags.export.plotting import find_curves, read_curves
 
     with rosz.bags.open(bag) as source:
         topics = {topic: [name] for topic, name in source.topics.items()}

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import random
+import tarfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -77,6 +80,81 @@ def test_the_library_reads_the_same(tmp_path: Path, compression: Compression) ->
         assert rows == dict(enumerate(payloads))
         assert [one.name for one in reader.iter_attachments()] == ["x.txt"]
         assert [one.metadata for one in reader.iter_metadata()] == [{"a": "b"}]
+
+
+def test_conformance_files_give_what_they_hold(tmp_path: Path) -> None:
+    """The files are those of MCAP's conformance tests: 416 forms of six contents, with the records
+    of each content in one description."""
+    with tarfile.open(Path(__file__).parent / "mcap_conformance.tar.xz") as archive:
+        archive.extractall(tmp_path, filter="data")
+    files = sorted(tmp_path.glob("*/*.mcap"))
+    assert len(files) == 416
+    wrong = []
+    for file in files:
+        expected = conformance_contents(file.with_name(f"{file.parent.name}.json"))
+        for scan in (False, True):
+            with McapReader(file, scan=scan) as reader:
+                assert (reader.problems, reader.count()) == ([], len(expected[0])), file.name
+                found = (
+                    [
+                        (*_about(one.channel), one.stamp, one.sent, one.sequence, one.data)
+                        for one in reader.messages()
+                    ],
+                    dict(reader.metadata),
+                    list(reader.attachments()),
+                    [_about(one) for one in reader.channels],
+                )
+            if found != expected:
+                wrong.append((file.name, scan))
+    assert not wrong
+
+
+def conformance_contents(file: Path) -> tuple[Any, ...]:
+    """Return the messages, metadata, attachments and channels that a description tells."""
+    rows = [(row["type"], dict(row["fields"])) for row in json.loads(file.read_text())["records"]]
+    schemas = {row["id"]: row for kind, row in rows if kind == "Schema"}
+    channels = {row["id"]: row for kind, row in rows if kind == "Channel"}
+
+    def about(channel: dict[str, Any]) -> tuple[str, ...]:
+        schema = schemas.get(channel["schema_id"], {"name": "", "encoding": "", "data": []})
+        text = _octets(schema["data"]).decode()
+        return (
+            channel["topic"],
+            channel["message_encoding"],
+            schema["name"],
+            schema["encoding"],
+            text,
+        )
+
+    messages: list[tuple[Any, ...]] = [
+        (
+            *about(channels[row["channel_id"]]),
+            int(row["log_time"]),
+            int(row["publish_time"]),
+            int(row["sequence"]),
+            _octets(row["data"]),
+        )
+        for kind, row in rows
+        if kind == "Message"
+    ]
+    return (
+        sorted(messages, key=lambda message: message[5]),
+        {row["name"]: row["metadata"] for kind, row in rows if kind == "Metadata"},
+        [
+            Attachment(row["name"], row["media_type"], int(row["log_time"]), _octets(row["data"]))
+            for kind, row in rows
+            if kind == "Attachment"
+        ],
+        [about(channel) for channel in channels.values()],
+    )
+
+
+def _octets(numbers: list[str]) -> bytes:
+    return bytes(map(int, numbers))
+
+
+def _about(channel: Channel) -> tuple[str, ...]:
+    return channel.topic, channel.encoding, channel.type, channel.language, channel.definition
 
 
 def test_programs_read_messages(tmp_path: Path) -> None:

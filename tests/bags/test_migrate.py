@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rosz.bags import Channel
-from rosz.bags.migrate import MigrationError, find_conversion, find_migration
+from rosz.bags.edit.migrate import MigrationError, find_conversion, find_migration
 from rosz.message import Message
 from rosz.msgs.geometry_msgs.msg import Point, Twist
 from rosz.msgs.sensor_msgs.msg import CameraInfo

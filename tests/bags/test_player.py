@@ -18,8 +18,8 @@ from network import TIMEOUT, Network, eventually
 
 import rosz.bags
 from rosz.bags import Channel, open_reader
-from rosz.bags.ahead import ReadAhead
-from rosz.bags.player import Player, PlayOptions, Progress
+from rosz.bags.play import Player, PlayOptions, Progress
+from rosz.bags.play.ahead import ReadAhead
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import PointStamped
 from rosz.msgs.rosgraph_msgs.msg import Clock
@@ -75,7 +75,7 @@ def _player(network: Network, *paths: Path, **options: Any) -> Player:
 
 def test_reading_ahead_is_done_before_the_first_message(monkeypatch: pytest.MonkeyPatch) -> None:
     """It does not take the processor while the first messages are due."""
-    monkeypatch.setattr("rosz.bags.ahead._FILL_TIMEOUT", TIMEOUT)
+    monkeypatch.setattr("rosz.bags.play.ahead._FILL_TIMEOUT", TIMEOUT)
     made: list[int] = []
 
     def make() -> Iterator[tuple[int, int]]:
@@ -289,7 +289,10 @@ def test_without_waiting_only_what_is_heard_is_published(network: Network, tmp_p
     bag = _bag(tmp_path / "a.mcap", [(f"/{n % 2}", n, Int32(data=n)) for n in range(2000)])
     heard = _Listener(network, "/1")
     player = _player(network, bag, immediate=True, wait_for_subscribers=False)
-    one, other = (player._made[key] for key in sorted(player._made, key=lambda key: str(key[0])))
+    one, other = (
+        player.outputs.publishers[key]
+        for key in sorted(player.outputs.publishers, key=lambda key: str(key[0]))
+    )
     other.wait_for_subscribers(1)
     eventually(lambda: other.heard)
     assert not one.heard
@@ -350,7 +353,8 @@ def test_a_topic_controls_the_rate(network: Network, tmp_path: Path) -> None:
     running = network.thread(player.run)
 
     def is_held_at(stamp: int) -> bool:
-        return player._controlled == stamp and player._pace.held
+        assert player._control is not None
+        return player._control.stamp == stamp and player._pace.delayed
 
     for second in (0, 1):
         control.publish(PointStamped(header=Header(stamp=Time(sec=100 + second))))
@@ -441,7 +445,7 @@ def test_the_end_of_the_node_ends_it(network: Network, tmp_path: Path) -> None:
 
 def test_it_waits_for_full_links_whatever_was_recorded(network: Network, tmp_path: Path) -> None:
     player = _player(network, _latched_bag(tmp_path / "a.mcap"), wait_for_subscribers=False)
-    assert {one.name: (one._blocks, one.qos) for one in player._made.values()} == {
+    assert {one.name: (one._blocks, one.qos) for one in player.outputs.publishers.values()} == {
         "/map": (True, LATCHED),
         "/a": (True, QoS(depth=7)),
     }

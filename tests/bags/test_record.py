@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
+import pty
 import random
 import signal
 import subprocess
 import sys
+import termios
 import threading
 import time
 from collections.abc import Iterator
@@ -15,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -25,11 +29,9 @@ from rosbags.highlevel import AnyReader
 from bags.messages import MESSAGES
 from rosz.bags import Channel, open_reader
 from rosz.bags.bag import Payload
-from rosz.bags.chunk_writer import ChunkWriter
-from rosz.bags.parameters import ParameterRecord
-from rosz.bags.recorder import Recorder
-from rosz.bags.recording import BagFiles, RecordOptions, Ring, Selection
-from rosz.bags.repair import recover
+from rosz.bags.edit.repair import recover
+from rosz.bags.formats.chunk_writer import ChunkWriter
+from rosz.bags.record import BagFiles, ParameterRecord, Recorder, RecordOptions, Ring, Selection
 from rosz.cli.main import run
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Trigger, TriggerRequest
@@ -52,7 +54,7 @@ with rosz.Node("custom") as node:
 @pytest.fixture(autouse=True)
 def late_tokens(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have recorders wait for the tokens of publishers, however late these come."""
-    monkeypatch.setattr("rosz.bags.recorder._TOKEN_TIMEOUT", TIMEOUT)
+    monkeypatch.setattr("rosz.bags.record.publishers._TOKEN_TIMEOUT", TIMEOUT)
 
 
 class Recording:
@@ -459,14 +461,15 @@ def test_what_waits_for_the_disk_is_bounded(
         connect(publisher)
         for number in range(40):
             publisher.publish(String(data=f"{number:06}" + " " * (1 << 20)))
-        buffer = made.recorder._buffer
+        queue = made.recorder._queue
 
         def has_last() -> bool:
-            _, (_, row) = buffer._items[-1]
-            return row is not None and row[-1] == 40
+            with queue._changed:
+                rows = [row for _, row in queue._ready]
+            return bool(rows) and rows[-1][-1] == 40
 
-        eventually(lambda: bool(buffer._items) and has_last(), "the last one has come")
-        assert buffer.size + made.files.waiting <= most
+        eventually(has_last, "the last one has come")
+        assert queue.size + made.files._writer._chunk.size <= most
         free.set()
     assert sum("the buffer of 8 MB is full" in one for one in made.said) == 1
     with open_reader(network.folder / "x.mcap") as reader:
@@ -568,6 +571,98 @@ def test_named_snapshots_are_numbered(network: Network) -> None:
     assert program.exit_code() == 0
 
 
+@pytest.mark.parametrize(
+    ("words", "parameters"),
+    [(("/chatter",), False), (("/chatter", "--parameters"), True), (("-a",), True)],
+)
+def test_parameters_are_recorded_when_asked_for(
+    network: Network, words: tuple[str, ...], parameters: bool
+) -> None:
+    node = network.node("talker")
+    node.params.set("/rate", 5)
+    node.publisher("/chatter", String, latch=True).publish(String(data="hello"))
+    program = record(network, *words, "-O", "x.mcap")
+    active = network.folder / "x.mcap.active"
+    wanted = {"/chatter", "/parameter_events"} if parameters else {"/chatter"}
+    eventually(lambda: wanted <= topics_in(active))
+    program.send(signal.SIGINT)
+    assert program.exit_code() == 0
+    assert topics_in(network.folder / "x.mcap") - {"/rosout"} == wanted
+    with open_reader(network.folder / "x.mcap") as reader:
+        assert ("parameters" in reader.metadata) == parameters
+
+
+def topics_in(path: Path) -> set[str]:
+    """Return the topics of the messages in a bag, which may be empty yet."""
+    if not path.exists() or not path.stat().st_size:
+        return set()
+    with open_reader(path) as reader:
+        return {one.channel.topic for one in reader.messages()}
+
+
+def test_a_terminal_that_is_closed_finishes_the_bag(network: Network) -> None:
+    publisher = network.node("talker").publisher("/chatter", String, latch=True)
+    publisher.publish(String(data="hello"))
+    words = [sys.executable, "-m", "rosz", "bag", "record", "-O", "x.mcap", "/chatter"]
+    leader, terminal = pty.openpty()
+
+    def control() -> None:
+        os.setsid()
+        fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
+
+    with subprocess.Popen(
+        words,
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        cwd=network.folder,
+        env=network.variables(TERM="xterm"),
+        preexec_fn=control,  # noqa: PLW1509  # no threads take part in it
+    ) as process:
+        os.close(terminal)
+        active = network.folder / "x.mcap.active"
+        eventually(lambda: topics_in(active) == {"/chatter"})
+        os.close(leader)  # the system sends SIGHUP
+        assert process.wait(TIMEOUT) == 0
+    assert topics_in(network.folder / "x.mcap") == {"/chatter"}
+
+
+def test_what_was_published_before_is_recorded_only_if_it_was_latched(network: Network) -> None:
+    node = network.node("talker")
+    latched = node.publisher("/map", String, qos=LATCHED)
+    held = node.publisher("/held", String, qos=msgspec.structs.replace(LATCHED, depth=10))
+    for number in range(5):
+        node.log.info("before %d", number)
+        latched.publish(String(data=f"{number}"))
+        held.publish(String(data=f"{number}"))
+    node.log.flush()
+    with recording(network, "a.mcap", every=True) as made:
+        eventually(lambda: made.count_of("/map") and made.count_of("/held"))
+        eventually(lambda: "/rosout" in made.recorder.topics)
+        node.log.info("meanwhile")
+        eventually(lambda: made.count_of("/rosout"))
+        late = network.node("late")
+        late.log.info("of a new node")
+        eventually(lambda: made.count_of("/rosout") >= 2)
+    assert made.recorder.lost == 0
+    with rosz_bag(made.files.done[0]) as bag:
+        lines = [one.message.msg for one in bag.messages("/rosout")]
+        assert [line for line in lines if "before" in line] == []
+        assert {"meanwhile", "of a new node"} <= set(lines)
+        for topic in ("/map", "/held"):
+            assert [one.message.data for one in bag.messages(topic)] == ["4"], topic
+
+
+def test_topics_that_were_not_followed_in_time_count_as_lost(network: Network) -> None:
+    node = network.node("talker")
+    for number in range(3):
+        node.publisher(f"/t{number}", String)
+    with recording(network, "a.mcap", every=True) as made:
+        made.node.context.graph.wait_for_topic("/t2", TIMEOUT)
+    assert made.recorder.lost >= 3
+    assert any("messages could come of" in line and "/t1, /t2" in line for line in made.said)
+
+
 @pytest.mark.ros1
 def test_a_bag_of_ros_1(network: Network) -> None:
     require("rosbag", package="python3-rosbag")
@@ -593,7 +688,7 @@ def test_a_bag_of_ros_1(network: Network) -> None:
 
 INTERRUPTED = """
 import os, runpy, signal, sys
-from rosz.bags import recording
+from rosz.bags.record import recording
 enter = recording.BagFiles.__enter__
 def interrupted(self):
     os.kill(os.getpid(), signal.SIGINT)

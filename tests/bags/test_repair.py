@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import random
+import struct
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from rosz.bags import Channel, McapReader, McapWriter
-from rosz.bags.repair import check_bag, recover, rewrite
+from rosz.bags import Channel, Compression, McapReader, McapWriter, open_reader
+from rosz.bags.edit.repair import check_bag, recover, rewrite
+from rosz.bags.formats.ros1_writer import Ros1Writer
 from rosz.cli.main import run
 from rosz.errors import BagError
 from rosz.msgs.std_msgs.msg import String
@@ -25,6 +27,7 @@ for words in sys.argv[1:]:
     print(run(["bag", *words.split()]), file=sys.stderr)
 """
 CHATTER = Channel("/chatter", "std_msgs/msg/String", definition="string data\n")
+ROS1_CHATTER = Channel("/chatter", "std_msgs/msg/String", "ros1", "string data\n", String._md5sum)
 COUNT = 500
 
 
@@ -185,3 +188,37 @@ def test_what_is_left_of_a_bag_for_which_there_is_no_room(tmp_path: Path) -> Non
     assert (tmp_path / "a.mcap").read_bytes() == begun
     count, _ = check_bag(tmp_path / "d")
     assert 0 < count < COUNT
+
+
+@pytest.mark.parametrize("compression", ["none", "bz2"])
+def test_a_chunk_that_was_begun_is_recovered(tmp_path: Path, compression: Compression) -> None:
+    """ROS 1's recorder fills in the size of a chunk when that is full."""
+    path = tmp_path / "a.bag.active"
+    with Ros1Writer(path, compression=compression) as writer:
+        handle = writer.add(ROS1_CHATTER)
+        for number in range(COUNT):
+            writer.write(handle, number, String(data=f"hello {number}").to_ros1())
+        writer.flush()
+        data = bytearray(path.read_bytes())
+    place = data.index(b"size=") + 5
+    (size,) = struct.unpack_from("<I", data, place + 4)
+    data[place : place + 8] = bytes(8)
+    begun = data[: place + 8 + size]
+    path.write_bytes(begun)
+    assert run(["bag", "reindex", str(path)]) == (0 if compression == "none" else 1)
+    with open_reader(tmp_path / "a.bag") as reader:
+        assert reader.indexed
+        assert reader.count() == COUNT
+
+
+def test_an_empty_copy_of_a_killed_bag_is_no_success(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.bag.active"
+    with Ros1Writer(path):
+        pass
+    data = path.read_bytes()
+    place = data.index(b"index_pos=") + 10
+    path.write_bytes(data[:place] + bytes(8) + data[place + 8 :])
+    assert run(["bag", "reindex", str(path)]) == 1
+    assert "killed before it had written one" in capsys.readouterr().err

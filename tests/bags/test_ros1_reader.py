@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag1 import Reader
 
-from rosz.bags.ros1_reader import Ros1Reader
+from rosz.bags.formats.ros1_reader import Ros1Reader
 from rosz.errors import BagError
 
 from .ros1_files import STORE, write_bag

@@ -12,8 +12,8 @@ from oracle import PYTHON, require
 import rosz.bags
 from bags.messages import MESSAGES
 from rosz.bags import Channel, Compression, open_reader
+from rosz.bags.formats.ros1_form import to_cdr, to_ros1
 from rosz.bags.opening import create_file
-from rosz.bags.ros1_form import to_cdr, to_ros1
 from rosz.errors import BagError, UsageError
 from rosz.qos import LATCHED
 from rosz.typestore import TypeStore

@@ -28,12 +28,13 @@ def test_info_imports_nothing_slow(tmp_path: Path) -> None:
 
 
 def test_recorder_of_mcap_imports_no_other_format() -> None:
-    ours = ("rosz.msgs.rcl_interfaces.srv", "rosz.bags.ros1_reader")
+    ours = ("rosz.msgs.rcl_interfaces.srv", "rosz.bags.formats.ros1_reader")
     large = ("_hashlib", "importlib.abc", "sqlite3", "yaml", *ours)
     script = f"""
 import sys
-import rosz.bags.parameters, rosz.bags.recorder, rosz.bags.recording, rosz.cli.bag.record
-import rosz.bags.mcap_writer, rosz.typestore
+import rosz.bags.record.parameters, rosz.bags.record.recorder, rosz.bags.record.recording
+import rosz.cli.bag.record
+import rosz.bags.formats.mcap_writer, rosz.typestore
 print([one for one in {large!r} if one in sys.modules])
 """
     command = [sys.executable, "-c", script]

@@ -11,15 +11,23 @@ from typing import Any
 import pytest
 from network import Network
 
-from rosz.bridges import foxglove, websocket
-from rosz.bridges.opening import Access
+from rosz.access import AccessPolicy, ServerAccess
+from rosz.bridges import foxglove, rosbridge
 from rosz.errors import TransportError, UsageError
 
 pytestmark = pytest.mark.system
 
 
-@pytest.mark.parametrize("package", [foxglove, websocket])
-def test_settings(network: Network, monkeypatch: pytest.MonkeyPatch, package: Any) -> None:
+@pytest.mark.parametrize(
+    ("package", "make", "name"),
+    [
+        (foxglove, foxglove.FoxgloveSettings, "foxglove"),
+        (rosbridge, rosbridge.RosbridgeSettings, "websocket"),
+    ],
+)
+def test_settings(
+    network: Network, monkeypatch: pytest.MonkeyPatch, package: Any, make: Any, name: str
+) -> None:
     node = network.node("bridge")
     for settings, reason in (
         ({"port": 65536}, "port 65536: expected 0 to 65535"),
@@ -28,19 +36,18 @@ def test_settings(network: Network, monkeypatch: pytest.MonkeyPatch, package: An
         ({"certificate": "/none", "key": "/none"}, "for TLS"),
     ):
         with pytest.raises(UsageError, match=reason):
-            package.open_bridge(node, package.Settings(**settings))
+            package.open_bridge(node, make(**settings))
     empty: Path = network.folder / "password"
     empty.write_text("\n")
     with pytest.raises(UsageError, match="has no password"):
-        package.open_bridge(node, package.Settings(password_file=str(empty)))
+        package.open_bridge(node, make(password_file=str(empty)))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(TransportError, match=f"cannot listen at 127.0.0.1 port {port}"):
-            package.open_bridge(node, package.Settings(port=port))
-    name = package.__name__.rpartition(".")[2]
+            package.open_bridge(node, make(port=port))
     monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
     with pytest.raises(UsageError, match=rf"pip install 'rosz\[{name}\]'"):
-        package.open_bridge(node, package.Settings(port=0))
+        package.open_bridge(node, make(port=0))
 
 
 @pytest.mark.parametrize(
@@ -57,6 +64,6 @@ def test_settings(network: Network, monkeypatch: pytest.MonkeyPatch, package: An
 )
 def test_addresses(host: str, password: str, address: str, *, tls: bool, shown: bool) -> None:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER) if tls else None
-    lines = Access(host, password, shown, context, None).describe("ws", 80)
+    lines = ServerAccess(host, AccessPolicy(password=password), shown, context).describe("ws", 80)
     assert lines[0] == address
     assert len(lines) == 1 + bool(password and not tls and host != "127.0.0.1")

@@ -9,7 +9,7 @@ from queue import SimpleQueue
 import pytest
 from network import TIMEOUT
 
-from rosz.bridges.tasks import Tasks, task_worker
+from rosz.bridges.clients import ClientTasks, task_worker
 from rosz.errors import UsageError
 
 
@@ -22,16 +22,16 @@ def test_others_find_threads() -> None:
         done.release()
 
     with closing(task_worker("tasks")) as worker:
-        one, other = Tasks(worker, 10_000), Tasks(worker, 10_000)
-        for _ in range(1000):
+        one, other = ClientTasks(worker, 9_000), ClientTasks(worker, 9_000)
+        for _ in range(900):
             one.submit(wait, 10)
-        with pytest.raises(UsageError, match="10000 bytes have not ended"):
+        with pytest.raises(UsageError, match="9000 bytes have not ended"):
             one.submit(wait, 10)
         other.submit(done.release, 20_000)  # a large one alone
         assert done.acquire(timeout=TIMEOUT)
         assert not go_on.is_set()
         go_on.set()
-        assert all(done.acquire(timeout=TIMEOUT) for _ in range(1000))
+        assert all(done.acquire(timeout=TIMEOUT) for _ in range(900))
 
 
 def test_a_client_that_leaves() -> None:
@@ -42,12 +42,12 @@ def test_a_client_that_leaves() -> None:
         performed.put(go_on.wait(TIMEOUT))
 
     with closing(task_worker("tasks")) as worker:
-        tasks = Tasks(worker, 1000)
+        tasks = ClientTasks(worker, 1000)
         for _ in range(100):
             tasks.submit(wait, 1)
         tasks.close()
         go_on.set()
-        Tasks(worker, 1).submit(ended.set, 1)
+        ClientTasks(worker, 1).submit(ended.set, 1)
         assert ended.wait(TIMEOUT)
         assert performed.get(timeout=TIMEOUT)
     assert performed.qsize() < 99

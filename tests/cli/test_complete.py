@@ -7,6 +7,7 @@ import pty
 import resource
 import select
 import shutil
+import socket
 import subprocess
 import sys
 import time
@@ -171,8 +172,6 @@ def test_an_empty_network_gives_nothing_at_once(
 
 
 def test_a_network_that_hangs_gives_nothing_soon(network: Network) -> None:
-    import socket
-
     with socket.socket(socket.AF_UNIX) as mute:
         mute.bind(str(network.folder / "z.sock"))
         mute.listen()
@@ -180,6 +179,45 @@ def test_a_network_that_hangs_gives_nothing_soon(network: Network) -> None:
         program = network.run("-m", "rosz", *words, ROSZ_COMPLETION_TIMEOUT="0.5")
         assert program.exit_code() == 0
         assert program.output == ""
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("rosz msg show std_msgs/Str", "std_msgs/String"),
+        ("roslaunch turtle_p", "turtle_pkg"),
+        ("rostopic pub /turtle1/cmd_vel geometry_msgs/Tw", "geometry_msgs/Twist"),
+        ("rosz tf ec", "echo"),
+    ],
+)
+def test_what_is_on_the_disk_comes_on_a_slow_machine(
+    network: Network, line: str, expected: str
+) -> None:
+    create(network.folder, "turtle_pkg")
+    with socket.socket(socket.AF_UNIX) as mute:
+        mute.bind(str(network.folder / "z.sock"))
+        mute.listen()
+        words = ("complete", "fish", line)
+        limits = {"ROSZ_COMPLETION_TIMEOUT": "1e-3", "ROS_PACKAGE_PATH": str(network.folder)}
+        program = network.run("-m", "rosz", *words, **limits)
+        assert program.exit_code() == 0
+        assert expected in program.lines
+
+
+def test_live_candidates_that_came_in_time(
+    system: Network, ask: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Replies that do not end, as where a machine was cut off, hide none of those that came."""
+    find = Session.live_tokens
+
+    def wait_for_more(session: Session, key: str, timeout: float) -> list[str]:
+        time.sleep(timeout)
+        return find(session, key, timeout)
+
+    assert system.domain
+    monkeypatch.setattr(Session, "live_tokens", wait_for_more)
+    monkeypatch.setenv("ROSZ_COMPLETION_TIMEOUT", "1.9")
+    assert ask("rostopic echo /turt") == ["/turtle1/cmd_vel"]
 
 
 def test_completion_takes_little_processor_time(system: Network) -> None:

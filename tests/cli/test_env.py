@@ -128,6 +128,30 @@ def test_a_sitecustomize_of_the_user_runs_as_well(network: Network) -> None:
     assert evaluate(network, "bash", line).stdout == "mine\n/unnamed\n"
 
 
+def test_ctrl_c_before_a_command_or_script_begins(network: Network) -> None:
+    press = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n"
+    (network.folder / "sitecustomize.py").write_text(press)
+    for line in ('"$ROSZ_PYTHON" -c "import rospy"', "rostopic list"):
+        done = evaluate(network, "bash", f'PYTHONPATH="$PYTHONPATH:." {line}; echo $?')
+        assert (done.stdout, done.stderr) == ("130\n", "")
+
+
+@pytest.mark.parametrize("module", ["rosz.interrupts", "rosz.ros1.importer", "rosz.node"])
+def test_ctrl_c_while_a_script_imports_rospy(network: Network, module: str) -> None:
+    (network.folder / "listener.py").write_text(
+        "import os, signal, sys\n"
+        "class Press:\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        f"        if name == '{module}':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Press())\n"
+        "import rospy\n"
+        "print('goes on')\n"
+    )
+    done = evaluate(network, "bash", '"$ROSZ_PYTHON" listener.py; echo $?')
+    assert (done.stdout, done.stderr) == ("130\n", "")
+
+
 @pytest.mark.parametrize(
     "line",
     [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from network import Network
+from network import Network, free_port
 
 from .command import package, rosz
 
@@ -57,6 +57,20 @@ def test_another_program(network: Network) -> None:
         for output in (run(network, "launch", str(file)), run(network, "run", "demo", "show"))
     )
     assert different(launched, alone) <= LAUNCHED | MASTER
+
+
+def test_a_master_at_the_port_of_the_environment(network: Network) -> None:
+    demo = package(network.folder / "src", "demo", show=SHELL)
+    file = demo / "show.launch"
+    file.write_text('<launch><node pkg="demo" type="show" name="show" output="screen"/></launch>')
+    port = free_port()
+    for host in ("localhost", "127.0.0.1", "[::1]"):
+        variables = {**network.variables(), "ROS_MASTER_URI": f"http://{host}:{port}/"}
+        output = rosz(network.folder, "launch", str(file), variables=variables).stdout
+        assert f"ROS_MASTER_URI=http://127.0.0.1:{port}" in seen(output), output
+    variables["ROS_MASTER_URI"] = f"http://192.0.2.1:{port}"
+    output = rosz(network.folder, "launch", str(file), variables=variables).stdout
+    assert f"ROS_MASTER_URI=http://127.0.0.1:{port}" not in seen(output), output
 
 
 def different(one: dict[str, str], other: dict[str, str]) -> set[str]:

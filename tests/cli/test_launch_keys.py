@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rosz.security.authority import Authority
+from rosz.security import Authority
 
 from .command import free_endpoint, package, rosz
 

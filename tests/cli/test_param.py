@@ -461,9 +461,7 @@ def test_a_writer_is_warned_of_silent_replicas(
 ) -> None:
     from params.test_replica import Mute
 
-    from rosz.params import replica as package
-
-    monkeypatch.setattr(package, "ACK_TIMEOUT", 0.3)
+    monkeypatch.setattr("rosz.params.replica.replica.ACK_TIMEOUT", 0.3)
     replica = network.replica()
     Mute(network)
     eventually(lambda: len(replica.members()) == 1)

@@ -8,6 +8,7 @@ import pytest
 import typer
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import Struct
 from typer.exceptions import TyperException
 
 from rosz.cli.declare import App, Argument, Option, values_last
@@ -19,19 +20,25 @@ lone = App()
 seen: list[tuple[Any, ...]] = []
 
 
+class TakeOptions(Struct, frozen=True, kw_only=True):
+    """The options of ``take``."""
+
+    flag: Annotated[bool, Option("-f --flag")] = False
+    count: Annotated[int | None, Option("-n COUNT")] = None
+    rate_of_all: Annotated[float, Option("--rate-of-all HZ")] = 1.5
+    each: Annotated[list[str] | None, Option("--each")] = None
+
+
 @app.command("take")
 def take(
     remappings: tuple,  # type: ignore[type-arg]  # called as a type
     first: Annotated[str, Argument("FIRST")],
+    options: TakeOptions,
     more: Annotated[list[str] | None, Argument("MORE")] = None,
-    *,
-    flag: Annotated[bool, Option("-f --flag")] = False,
-    count: Annotated[int | None, Option("-n COUNT")] = None,
-    rate_of_all: Annotated[float, Option("--rate-of-all HZ")] = 1.5,
-    each: Annotated[list[str] | None, Option("--each")] = None,
 ) -> None:
     """Take what there is."""
-    seen.append((remappings, first, more or None, flag, count, rate_of_all, each or None))
+    rest = options.flag, options.count, options.rate_of_all, options.each or None
+    seen.append((remappings, first, more or None, *rest))
 
 
 @app.command("set", arrange=values_last("-t"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+import time
 from collections.abc import Callable
 
 import pytest
@@ -71,3 +73,22 @@ def test_a_machine_that_the_core_waits_for(
     here.wait_for(f"connected to {far}")
     again = shell("topic", "list")
     assert (again.code, again.err) == (0, "")
+
+
+def test_a_machine_that_is_off_is_named_soon(shell: Shell) -> None:
+    began = time.monotonic()
+    result = finished(shell.start("topic", "list", ROSZ_CONNECT="tcp/192.0.2.1:9,tcp/[::1]:9"))
+    assert result.code == 1
+    assert "no link to 'tcp/192.0.2.1:9': " in result.out
+    assert "no link to 'tcp/[::1]:9': Connection refused" in result.out
+    assert time.monotonic() - began < 6  # of which most is Python's, where others run as well
+
+
+@pytest.mark.parametrize("command", [("topic", "list"), ("run", "rosz_tutorials", "publisher.py")])
+def test_an_address_that_says_nothing(shell: Shell, command: tuple[str, ...]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+        program = shell.start(*command, ROSZ_CONNECT=endpoint)
+        line = program.wait_for("it accepts connections and says nothing")
+        assert endpoint in line
+        program.close()

@@ -32,7 +32,7 @@ def test_memory_is_bounded() -> None:
     for number in range(500):
         summary.add(LINE.format(f"kind {'x' * number}"))
     assert len(written) == 500
-    assert len(summary._seen) == 100
+    assert len(summary.seen) == 100
 
 
 def test_other_messages_are_passed_on() -> None:

@@ -15,7 +15,7 @@ sys.path[:0] = [str(_TESTS), str(_TESTS / "launch")]
 
 import oracle  # noqa: E402  # found by the line above
 
-from corpus import launch, types  # noqa: E402
+from corpus import definitions, launch  # noqa: E402
 from corpus.devel import Devel  # noqa: E402
 from corpus.nodes import Nodes  # noqa: E402
 from corpus.packages import Corpus, Repository  # noqa: E402
@@ -48,7 +48,7 @@ def compared(given: Namespace, corpus: Corpus, own: list[Repository]) -> Iterato
         return launch.compare(corpus, own, given.limit)
     devel = Devel(corpus, given.work / "devel")
     if given.what == "types":
-        return types.compare(corpus, devel, own)
+        return definitions.compare(corpus, devel, own)
     devel.build(corpus.repositories)
     return Nodes(corpus, devel, given.work, given.limit).compare(own, given.only, given.jobs)
 

@@ -14,7 +14,7 @@ from oracle import require
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "launch"))
 
-from corpus import launch, types  # found by the line above
+from corpus import definitions, launch  # found by the line above
 from corpus.devel import Devel
 from corpus.nodes import Nodes, differences
 from corpus.packages import Corpus
@@ -36,7 +36,7 @@ def test_launch_files_are_read_as_roslaunch_reads_them(corpus: Corpus) -> None:
 
 def test_types_have_the_md5_of_genpy(corpus: Corpus, tmp_path: Path) -> None:
     require("genpy", "rospy", package="python3-genpy, python3-rospy")
-    rows = list(types.compare(corpus, Devel(corpus, tmp_path), corpus.repositories))
+    rows = list(definitions.compare(corpus, Devel(corpus, tmp_path), corpus.repositories))
     assert {row["case"] for row in rows if row["equal"] and "error" not in row["rosz"]} == {
         "checkout:msg field_msgs/Track",
         "checkout:srv field_msgs/Select",

@@ -9,7 +9,7 @@ from hosts.conftest import world
 from hosts.world import World
 from network import eventually
 
-from rosz.security.authority import Authority
+from rosz.security import Authority
 
 __all__ = ("world",)
 

@@ -74,6 +74,25 @@ def test_why_an_endpoint_refuses(endpoint: str, reason: str) -> None:
     assert reason in why_refused(endpoint)
 
 
+def test_a_package_path_that_leads_nowhere(doctor: Doctor, network: Network) -> None:
+    network.node("talker")
+    file = network.folder / "file"
+    file.touch()
+    roots = (network.folder, network.folder / "gone", file)
+    found = doctor(package_roots=roots)["missing-path"]
+    assert found.level == "warning"
+    assert found.evidence == (f"{roots[1]}: it does not exist", f"{file}: it is a file")
+    assert doctor(package_roots=roots[:1]) == {}
+
+
+def test_a_namespace_that_nodes_refuse(doctor: Doctor, network: Network) -> None:
+    network.node("talker")
+    finding = doctor(namespace="/my robot")["refused-name"]
+    assert "ROS_NAMESPACE is '/my robot'" in finding.text
+    assert "character ' ' at position 4" in finding.evidence[0]
+    assert doctor(namespace="/my_robot") == {}
+
+
 def test_shared_memory_that_is_full(doctor: Doctor, network: Network) -> None:
     (network.folder / "big.zenoh").write_bytes(bytes(1000))
     finding = doctor(least_free=1 << 60)["shared-memory-full"]

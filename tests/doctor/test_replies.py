@@ -14,7 +14,7 @@ from network import Network, Program, eventually
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.node.control import control_key
-from rosz.params.wire import Keys, Member, SyncReply, encode
+from rosz.params.wire import Keys, ReplicaMember, SyncReply, encode
 from rosz.session import Query, Session, is_stopped
 from rosz.wire import entity_key, pack_attachment
 
@@ -81,6 +81,7 @@ def test_a_node_that_hangs(doctor: Doctor, network: Network) -> None:
     finally:
         program.send(signal.SIGCONT)
     assert found["unreachable-node"].level == "error"
+    assert found["unreachable-node"].text == "1 node is listed without an answer"
     assert found["unreachable-node"].evidence[0].startswith("/stopped (")
     assert found["unreachable-node"].evidence[0].endswith(f"pid {program.pid}): it is stopped")
     assert found["stopped-process"].evidence[0].endswith(f"(pid {program.pid})")
@@ -220,7 +221,7 @@ def test_a_replica_out_of_step(doctor: Doctor, network: Network) -> None:
     session, keys = network.session(), Keys(network.domain)
     odd = SyncReply(digest=b"".join(struct.pack("<BQ", index, 1) for index in range(64)))
     answering(network, session, keys.of(session.zid, "sync"), encode(odd))
-    network._keep(session.token(keys.token(Member(1, session.zid, "odd one"))))
+    network._keep(session.token(keys.token(ReplicaMember(1, session.zid, "odd one"))))
     eventually(lambda: len(session.peers()) == 2, "links to both")
     finding = doctor()["replica-out-of-step"]
     (line,) = finding.evidence

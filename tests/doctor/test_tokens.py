@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 from network import Network
 
+from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.std_msgs.msg import Int32, String
@@ -111,6 +112,20 @@ def test_who_waits_for_nobody(doctor: Doctor, network: Network) -> None:
     assert found["no-subscriber"].evidence[0].endswith("is it meant for '/chater'?")
 
 
+def test_what_action_servers_publish(doctor: Doctor, network: Network) -> None:
+    """Nobody has to listen to an action server; but a client of one waits for it."""
+    node = network.node("alone")
+    node.action_server("/fibonacci", Fibonacci, print)
+    assert doctor() == {}
+    node.action_client("/dock", Fibonacci)
+    found = doctor()
+    assert list(found) == ["no-publisher"]
+    assert {line.split()[0] for line in found["no-publisher"].evidence} >= {
+        "/dock/_action/feedback",
+        "/dock/_action/status",
+    }
+
+
 def test_time_that_stands_still(doctor: Doctor, network: Network) -> None:
     simulator = network.node("simulator")
     simulator.params["/use_sim_time"] = True
@@ -128,6 +143,13 @@ def test_nodes_of_one_name(doctor: Doctor, network: Network) -> None:
     finding = doctor()["duplicate-node"]
     assert finding.text == "2 nodes are called /stranger"
     assert len(finding.evidence) == 2
+
+
+def test_names_that_others_refuse(doctor: Doctor, network: Network) -> None:
+    stranger(network, name="/my scan")
+    (line,) = doctor()["refused-name"].evidence
+    assert line.startswith("/stranger (session ")
+    assert "'/my scan' is not a valid name" in line
 
 
 def test_tokens_of_another_form(doctor: Doctor, network: Network) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from network import TIMEOUT, Network, Program
+from network import TIMEOUT, Network, Program, eventually
 
 from rosz.graph import Graph
 
@@ -47,6 +47,8 @@ def test_each_dies_and_comes_back(network: Network) -> None:
     graph = observer.context.graph
     names = {f"/n{number}" for number in range(COUNT)}
     graph.wait_for(lambda view: names <= set(view.nodes()), TIMEOUT, "all nodes")
+    # The mesh is complete: the observer itself sees the end of each process.
+    eventually(lambda: len(observer.context.session.links()) >= COUNT, "links to all")
     gone, back = [], []
     for number in range(COUNT):
         began = time.monotonic()

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-__all__ = ("MODULES", "docs", "signatures")
+__all__ = ("MODULES", "signatures")
 
 _TABLE = {
     "rosz": "errors qos time names params reconfigure transforms message idl typestore launch.plan "
@@ -76,17 +76,6 @@ _STARS: dict[Any, str] = {
 def signatures(module: str) -> str:
     """Return the names of a module with their kinds and signatures."""
     return "".join(f"{line}\n" for line in _Module(module).lines())
-
-
-def docs(module: str) -> str:
-    """Return the first line of the docstring of each name of a module that has one."""
-    found = {"": _first_line(_load(module))}
-    for name, value in _public(_load(module)):
-        if _is_ours(value) and _home(value, module) == module:
-            found[name] = _first_line(value)
-            if isinstance(value, type):
-                found |= {f"{name}.{key}": _first_line(one) for key, one in _members(value)}
-    return "".join(f"{name}: {text}\n" for name, text in found.items() if text)
 
 
 class _Module:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rosz.cli.commands import COMMANDS, load
-from rosz.cli.declare import Command, Option, Parameter
+from rosz.cli.declare import Command, CommandParameter, Option
 
 __all__ = ("as_json", "lines")
 
@@ -60,7 +60,7 @@ def _text(command: Command) -> str:
     return "\n\n".join(" ".join(part.split()) for part in command.help.split("\n\n"))
 
 
-def _argument(one: Parameter) -> dict[str, Any]:
+def _argument(one: CommandParameter) -> dict[str, Any]:
     assert one.mark is not None
     return {
         "metavar": one.mark.metavar or one.name.upper(),
@@ -72,7 +72,7 @@ def _argument(one: Parameter) -> dict[str, Any]:
     }
 
 
-def _option(one: Parameter) -> dict[str, Any]:
+def _option(one: CommandParameter) -> dict[str, Any]:
     assert isinstance(one.mark, Option)
     shared = _argument(one)
     if one.kind is bool:

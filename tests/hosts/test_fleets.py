@@ -10,7 +10,7 @@ from network import eventually
 from hosts.host import Host, HostProgram
 from hosts.scripts import TALKER
 from hosts.world import World
-from rosz.security.authority import Authority
+from rosz.security import Authority
 
 
 def core(host: Host, *options: str) -> HostProgram:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from network import TIMEOUT, Network, eventually
 
+from rosz.actions import ServerGoal, view_of_action
 from rosz.errors import NotFoundError
 from rosz.graph import Graph, View
-from rosz.introspect.actions import view_of_action
 from rosz.introspect.services import find_server, wait_for_server
 from rosz.introspect.subscribe import wait_for_target
 from rosz.introspect.survey import take_survey
@@ -15,7 +15,6 @@ from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import Context
-from rosz.node.action_server import ServerGoal
 from rosz.session import Session
 
 SEND = """

@@ -12,7 +12,8 @@ import pytest
 
 from rosz.errors import DecodeError, EncodeError
 from rosz.message import Message, slots
-from rosz.message.schema_codec import decode_plainly_ros1, encode_plainly_ros1
+from rosz.message.layout import ROS1
+from rosz.message.schema_codec import decode_plainly, encode_plainly
 from rosz.msgs.builtin_interfaces.msg import Duration, Time
 from rosz.msgs.geometry_msgs.msg import PoseStamped
 from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, JointState, Range
@@ -65,10 +66,10 @@ def test_fast_and_slow_codec_agree(name: str) -> None:
     for _ in range(6):
         message = ros1_value(name, rng)
         data = message.to_ros1()
-        assert encode_plainly_ros1(message, cls) == data
+        assert encode_plainly(message, cls, ROS1) == data
         again = cls.from_ros1(data)
         assert again.to_ros1() == data
-        assert repr(decode_plainly_ros1(data, cls)) == repr(again)
+        assert repr(decode_plainly(data, cls, ROS1)) == repr(again)
         assert repr(cls.from_ros1(memoryview(data + b"behind it"))) == repr(again)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rosz.node.decoder import Decoder, Received
+from rosz.node.decoder import Received, SampleDecoder
 from rosz.session import Reply, Sample
 from rosz.wire import pack_attachment
 
@@ -28,8 +28,8 @@ def _sample(sequence: int, *, replayed: bool) -> Sample:
     return Reply(SimpleNamespace(ok=raw)) if replayed else Sample(raw)  # type: ignore[arg-type]
 
 
-def _decoder(counted: list[int]) -> Decoder:
-    return Decoder(
+def _decoder(counted: list[int]) -> SampleDecoder:
+    return SampleDecoder(
         "/map",
         "std_msgs/msg/String",
         "",
@@ -41,7 +41,7 @@ def _decoder(counted: list[int]) -> Decoder:
     )
 
 
-def _decode(decoder: Decoder, samples: str) -> list[Received | None]:
+def _decode(decoder: SampleDecoder, samples: str) -> list[Received | None]:
     return [
         decoder.decode(_sample(int(one.lstrip("r")), replayed=one[0] == "r"))
         for one in samples.split()

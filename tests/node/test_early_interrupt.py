@@ -115,7 +115,8 @@ INTERACTIVE = """
 import time
 import rosz
 node = rosz.Node('typed')
-print('ready', flush=True); time.sleep(100)
+print('ready', flush=True)
+while True: time.sleep(0.01)  # in one long sleep, a signal right before it would be seen at its end
 """
 
 
@@ -143,7 +144,7 @@ def test_interactive_interpreter(network: Network) -> None:
 def test_interactive_interpreter_is_terminated(network: Network) -> None:
     program = _interactive(network)
     program.say("node.on_shutdown(lambda reason: print(f'hook: {reason}', flush=True))")
-    program.say("print('again', flush=True); time.sleep(100)")
+    program.say("print('again', flush=True); [time.sleep(0.01) for _ in iter(int, 1)]")
     program.wait_for("again")
     program.send(signal.SIGTERM)
     program.wait_for("hook: SIGTERM")

@@ -39,17 +39,17 @@ def test_subscribing(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_learning_a_type(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     subscription = network.node().subscription("chatter")
-    learn = subscription._learn
+    learn = subscription._decoders._find
     learned: list[str] = []
 
     def interrupted(type_name: str, type_hash: str) -> Any:
         learned.append(type_name)
         if len(learned) == 1:
-            subscription._decoder_for(String._type, String._type_hash)
+            subscription._decoders.of_type(String._type, String._type_hash)
         return learn(type_name, type_hash)
 
-    monkeypatch.setattr(subscription, "_learn", interrupted)
-    in_time(lambda: subscription._decoder_for(String._type_name, String._type_hash))
+    monkeypatch.setattr(subscription._decoders, "_find", interrupted)
+    in_time(lambda: subscription._decoders.of_type(String._type_name, String._type_hash))
     assert len(learned) == 2
 
 

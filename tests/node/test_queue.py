@@ -7,6 +7,7 @@ import math
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,7 +24,8 @@ def filled(
 ) -> Subscription[Any]:
     """Return a subscription with some samples in its queue."""
     subscription = network.node().subscription("chatter")
-    monkeypatch.setattr(subscription, "_decode", lambda sample, _: (decode(sample), None))
+    decoder = SimpleNamespace(decode=lambda sample: (decode(sample), None))
+    monkeypatch.setattr(subscription._decoders, "of_sample", lambda _: decoder)
     for sample in samples:
         subscription._receive(sample)
     return subscription

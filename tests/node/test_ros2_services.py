@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import datetime as dt
+import time
 from array import array
+from queue import SimpleQueue
 from typing import Any
 
 import pytest
@@ -11,7 +13,12 @@ from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ParamError
 from rosz.msgs.geometry_msgs.msg import Twist
-from rosz.msgs.rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rosz.msgs.rcl_interfaces.msg import (
+    Parameter,
+    ParameterEvent,
+    ParameterType,
+    ParameterValue,
+)
 from rosz.msgs.rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -23,7 +30,9 @@ from rosz.msgs.rcl_interfaces.srv import (
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
 from rosz.node import Client, Node
-from rosz.node.ros2_values import from_ros2, to_ros2
+from rosz.node.ros2.values import from_ros2, to_ros2
+from rosz.params import DELETED
+from rosz.qos import PARAMETERS
 from rosz.wire import Kind, Token, format_token
 
 STORED = {
@@ -294,3 +303,91 @@ def test_they_end_with_the_node(talker: Node, asker: Node) -> None:
     client(asker, "get_parameters", GetParameters)
     talker.close()
     asker.context.graph.wait_for(lambda view: not view.services(), TIMEOUT, "no more services")
+
+
+EVENTS = "/parameter_events"
+
+
+def subscribe_events(node: Node) -> SimpleQueue[ParameterEvent]:
+    events: SimpleQueue[ParameterEvent] = SimpleQueue()
+    node.subscription(EVENTS, ParameterEvent, events.put)
+    return events
+
+
+def values_of(parameters: list[Parameter]) -> dict[str, object]:
+    return {row.name: from_ros2(row.value) for row in parameters}
+
+
+def next_event(events: SimpleQueue[ParameterEvent], node: str) -> list[dict[str, object]]:
+    """Return what is new, changed and deleted in the next event of a node."""
+    while (event := events.get(timeout=TIMEOUT)).node != node:
+        pass
+    assert abs(event.stamp.sec - time.time()) < TIMEOUT
+    groups = event.new_parameters, event.changed_parameters, event.deleted_parameters
+    return list(map(values_of, groups))
+
+
+def test_events_of_calls(asker: Node, talker: Node) -> None:
+    """One event for each call, with what rclpy's has, from a publisher like that of rclpy."""
+    events = subscribe_events(asker)
+    view = asker.context.graph.wait_for(
+        lambda view: len(view.publishers(EVENTS)) == 2, TIMEOUT, "the publishers"
+    )
+    names = {token.node_name: token for token in view.publishers(EVENTS)}
+    publisher = names["/robot/talker"]
+    assert publisher.type_name == "rcl_interfaces/msg/ParameterEvent"
+    assert publisher.qos == PARAMETERS
+    talker.params["~rate"] = 10.0  # it is that already
+    put = client(asker, "set_parameters_atomically", SetParametersAtomically)
+    assert put([number("rate", 6), Parameter("gains.p"), number("a", 1)]).result.successful
+    assert next_event(events, "/robot/talker") == [{"a": 1}, {"rate": 6}, {"gains.p": DELETED}]
+    put = client(asker, "set_parameters", SetParameters)
+    assert all(each.successful for each in put([number("a", 2), number("b", 3)]).results)
+    assert next_event(events, "/robot/talker") == [{}, {"a": 2}, {}]
+    assert next_event(events, "/robot/talker") == [{"b": 3}, {}, {}]
+
+
+def test_events_of_the_store(asker: Node, talker: Node) -> None:
+    """However a parameter is set: with types that are other ones, in a subtree, from elsewhere."""
+    events = subscribe_events(asker)
+    asker.context.graph.wait_for(
+        lambda view: len(view.publishers(EVENTS)) == 2, TIMEOUT, "the publishers"
+    )
+    talker.params["~rate"] = 10
+    assert next_event(events, "/robot/talker") == [{}, {"rate": 10}, {}]
+    asker.params["/robot/talker/gains"] = {"p": 1, "q": "new"}
+    assert next_event(events, "/robot/talker") == [
+        {"gains.q": "new"},
+        {},
+        {"gains.inner.deep": DELETED, "gains.names": DELETED},
+    ]
+    del talker.params["/robot"]
+    gone = {"rate", "gains.p", "gains.q", "odd", "day"}
+    assert next_event(events, "/robot/talker") == [{}, {}, dict.fromkeys(gone, DELETED)]
+
+
+def test_who_was_there_hears_of_the_first_parameters(network: Network) -> None:
+    asker = network.node("asker")
+    asker.params["/late"] = {"rate": 5, "gains": {"p": 0.5}}
+    events = subscribe_events(asker)
+    network.node("late")
+    assert next_event(events, "/late") == [
+        {"use_sim_time": False, "rate": 5, "gains.p": 0.5},
+        {},
+        {},
+    ]
+
+
+def test_nobody_wants_events(network: Network, talker: Node) -> None:
+    """Without a node of ROS 2 or a subscription of them, nobody publishes any."""
+    other = network.node("other")
+    talker.params["~rate"] = 1
+    other.subscription("/robot/parameter_events", ParameterEvent)
+    graph = talker.context.graph
+    graph.wait_for_subscribers("/robot/parameter_events", 1, TIMEOUT)
+    assert graph.view().publishers(EVENTS) == []
+    kept = network.session().token(
+        format_token(Token(network.domain, "abc", 0, 0, Kind.NODE, "/", "_ros2cli_1"))
+    )
+    graph.wait_for(lambda view: len(view.publishers(EVENTS)) == 2, TIMEOUT, "the publishers")
+    kept.close()

@@ -67,7 +67,8 @@ def test_deaf_program_is_interrupted(network: Network, number: signal.Signals, c
         node.on_shutdown(lambda reason: print(f"hook: {reason}\\n", end="", flush=True))
         try:
             print("ready", flush=True)
-            time.sleep(100)
+            while True:  # a signal right before one long sleep would be seen at its end
+                time.sleep(0.01)
         except BaseException as error:
             print(type(error).__name__, flush=True)
             raise
@@ -205,14 +206,16 @@ def test_after_the_end_signals_do_what_they_always_did(network: Network) -> None
             node.is_shutdown
         try:
             print("ready", flush=True)
-            time.sleep(100)
+            while True:  # a signal right before one long sleep would be seen at its end
+                time.sleep(0.01)
         except KeyboardInterrupt:
             print("interrupted", flush=True)
         with rosz.Node("again") as node:
             node.timer(0.05, lambda _: print("again", flush=True), oneshot=True)
             node.spin()
         print("deaf", flush=True)
-        time.sleep(100)
+        while True:
+            time.sleep(0.01)
         """
     )
     program.wait_for("ready")

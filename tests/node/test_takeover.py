@@ -11,7 +11,7 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.std_msgs.msg import String
-from rosz.node import Node, core, takeover
+from rosz.node import Node, control, core
 from rosz.wire import ProcessToken, format_process
 
 LOSER = """
@@ -74,8 +74,8 @@ def test_same_base_name_elsewhere_is_another_node(network: Network) -> None:
         network.node("king", context=network.context(domain=7)),
     ]
     seen = threading.Event()
-    nodes[0].context.graph.listen_to_processes(
-        lambda other, _: seen.set() if other.node == "/last" else None
+    nodes[0].context.graph.listen(
+        lambda other, _: seen.set() if other.node_name == "/last" else None
     )
     network.node("last")
     assert seen.wait(TIMEOUT)  # listeners are called in order: the king has seen all the others
@@ -115,7 +115,7 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
         assert go_on.wait(TIMEOUT)
         return False
 
-    monkeypatch.setattr(takeover, "_is_newer", slowly)
+    monkeypatch.setattr(control, "_is_newer", slowly)
     king = network.node("king")
     elsewhere = network.context()
     ended = takeovers()
@@ -124,10 +124,10 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
         for number in range(50)
     ]
     tokens = [elsewhere.session.token(format_process(duplicate)) for duplicate in duplicates]
-    seen = [asked.get(timeout=TIMEOUT) for _ in range(takeover._THREADS)]
+    seen = [asked.get(timeout=TIMEOUT) for _ in range(control._THREADS)]
     network.node("last")
     king.context.graph.wait_for_node("/last", TIMEOUT)
-    assert len(takeovers() - ended) == takeover._THREADS
+    assert len(takeovers() - ended) == control._THREADS
     go_on.set()
     seen += [asked.get(timeout=TIMEOUT) for _ in range(len(duplicates) - len(seen))]
     assert sorted(seen) == list(range(len(duplicates)))

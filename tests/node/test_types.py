@@ -14,7 +14,7 @@ from rosz.errors import TypeNotFound, WaitTimeout
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import MessageInfo, Node
-from rosz.node.type_description import request_definition, request_type
+from rosz.node.ros2.types import request_definition, request_type
 from rosz.wire import Token
 
 PART = "float64 weight\ngeometry_msgs/Point[] corners\n"

@@ -13,7 +13,7 @@ from rosz.errors import UsageError, WaitTimeout
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.std_msgs.msg import Int32
 from rosz.node import Node
-from rosz.params.remote import ParamClient
+from rosz.params.replica import ParamClient
 
 WAITS: dict[str, Callable[[Node, float], Any]] = {
     "get": lambda node, value: node.subscription("x", Int32).get(value),

@@ -69,6 +69,12 @@ class Process(Program):
         status = Path(f"/proc/{self.pid}/stat")
         eventually(lambda: status.read_text().rpartition(")")[2].split()[0] == "T", "its stop")
 
+    def end(self) -> None:
+        """Let it end in the ordinary way: by the end of its stdin."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        self.process.wait(TIMEOUT)
+
     def resume(self) -> None:
         """Let it run again."""
         self.send(signal.SIGCONT)

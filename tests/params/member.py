@@ -15,9 +15,9 @@ import timeit
 from pathlib import Path
 from typing import Any
 
+from rosz.errors import PartlyWritten
 from rosz.params import DELETED, condense, normalise, split, spread
-from rosz.params.api import Params
-from rosz.params.replica import Changed, Replica
+from rosz.params.replica import Changed, Params, Replica
 from rosz.params.replica.storage import Storage, StoreFile
 from rosz.session import (
     HybridClock,
@@ -72,7 +72,8 @@ class Member:
         if mode == "peer":
             serve_links(self._session)
             settled = MeshReadiness(self._session, 0.5, threading.Event()).ready
-        storage = Storage(StoreFile(Path(file))) if file else None
+        self._file = StoreFile(Path(file)) if file else None
+        storage = None if self._file is None else Storage(self._file)
         self.replica = Replica(
             self._session, label=f"member {os.getpid()}", settled=settled, storage=storage
         )
@@ -89,8 +90,16 @@ class Member:
 
     def do_set(self, name: str, value: Any, timeout: float = 2.0) -> Any:
         begun = time.perf_counter()
-        outcome = self.replica.set(name, value, timeout=timeout)
+        try:
+            outcome = self.replica.set(name, value, timeout=timeout)
+        except PartlyWritten as error:
+            return {"partly": str(error)}
         return {"slow": outcome.slow, "seconds": time.perf_counter() - begun}
+
+    def do_fill(self) -> None:
+        """Let the file not grow any more, as on a full disk."""
+        assert self._file is not None
+        self._file._base.execute("PRAGMA max_page_count = 1")
 
     def do_delete(self, name: str) -> Any:
         return self.replica.delete(name).slow
@@ -103,7 +112,8 @@ class Member:
 
     def do_forget(self, keep: int) -> Any:
         """Forget old deletions, as a replica does from time to time."""
-        return self.replica._state.forget(keep)
+        with self.replica._runner as history:
+            return history.forget(keep)
 
     def do_get(self, name: str) -> Any:
         return self.replica.get(name)

@@ -10,8 +10,7 @@ from network import TIMEOUT
 
 from rosz.lifecycle import Closable
 from rosz.params import condense, normalise, spread
-from rosz.params.remote import ParamClient
-from rosz.params.replica import Outcome, Replica
+from rosz.params.replica import Outcome, ParamClient, Replica
 from rosz.session import MeshReadiness, Session, SessionConfig, serve_links
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import threading
 from queue import SimpleQueue
 
-from rosz.params.replica.serve import is_key_in
 from rosz.params.wire import Keys
-from rosz.session import Query, Sample, Session, Stamp
+from rosz.session import Query, Sample, Session, Stamp, is_key_in
 
 
 class Storage:

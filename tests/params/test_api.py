@@ -9,8 +9,7 @@ import pytest
 from network import TIMEOUT
 
 from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
-from rosz.params.api import Params
-from rosz.params.replica import Changed, Replica
+from rosz.params.replica import Changed, Params, Replica
 
 from .network import Network
 

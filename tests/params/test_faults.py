@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import pytest
 from network import TIMEOUT, free_port
 
-from rosz.params.replica.sync import KEPT_TOMBSTONES
+from rosz.params.replica.core.work import KEPT_TOMBSTONES
 
 from .fleet import Cable, Fleet, Process, until_known, until_same
 
@@ -244,6 +244,44 @@ def test_a_kept_store_survives_the_kill_of_everybody(fleet: Fleet) -> None:
     root = again.do("root")["ns"]
     assert all(root[name.rpartition("/")[2]] == value for name, value in sure.items())
     print(f"{len(sure)} writes acknowledged before kill -9 of all are back from the file")
+
+
+def test_a_full_disk_undoes_nothing_that_others_acknowledged(fleet: Fleet) -> None:
+    """The one with the full disk writes while it is cut off, and so do the others."""
+    port = free_port()
+    cable = Cable(port)
+    keeper = fleet.start(
+        endpoint=f"tcp/127.0.0.1:{port}", mode="router", file=str(fleet.folder / "params")
+    )
+    link = [f"tcp/127.0.0.1:{cable.port}"]
+    other = fleet.start(endpoint=f"tcp/127.0.0.1:{free_port()}", mode="router", connect=link)
+    until_known([keeper, other])
+    assert keeper.do("set", name="/ns", value={"kept": 1, "gone": 1})["slow"] == []
+    until_same([keeper, other], "before the cut")
+    keeper.do("fill")
+    cable.cut()
+    keeper.tell("set", name="/ns", value={"kept": 2, "gone": 2, "big": "x" * 100_000}, timeout=3.0)
+    pass_time(1.0)
+    assert other.do("set", name="/ns/kept", value=3, timeout=0.1)
+    assert other.do("delete", name="/ns/gone") is not None
+    assert "not kept at member" in keeper.answer()["partly"]
+    cable.mend()
+    until_known([keeper, other])
+    until_same([keeper, other], "a full disk beside a cut")
+    root = other.do("root")["ns"]
+    assert root["kept"] == 3
+    assert "gone" not in root
+    assert len(root["big"]) == 100_000
+    cable.close()
+
+
+def test_the_last_write_of_a_program_that_ends_is_handed_over(fleet: Fleet) -> None:
+    one, writer = fleet.start_many(2)
+    for number in range(30):
+        writer.do("set", name=f"/last/{number}", value=number, timeout=0)
+    writer.end()
+    root = one.do("root")
+    assert root["last"] == {str(number): number for number in range(30)}
 
 
 def test_many_replicas_in_one_domain(fleet: Fleet) -> None:

@@ -99,7 +99,7 @@ def test_a_storage_holds_what_the_store_holds(network: Network) -> None:
 
 def source(replica: Replica) -> Write | None:
     """Return the write that /a/b has its value from."""
-    with replica._state as history:
+    with replica._runner as history:
         return history.source(("a", "b"))
 
 

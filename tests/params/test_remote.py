@@ -10,8 +10,8 @@ import pytest
 from network import TIMEOUT, eventually
 
 from rosz.errors import NoReplica, ParamError, ParamNotFound, WaitTimeout
-from rosz.params.remote import ParamClient
-from rosz.params.replica import ACK_TIMEOUT, Changed, Outcome
+from rosz.params.replica import ACK_TIMEOUT, Changed, Outcome, ParamClient
+from rosz.params.replica.core.events import CompareCalled
 from rosz.params.wire import Keys
 from rosz.params.writes import DELETED, Change, condense
 from rosz.session import HybridClock, Query
@@ -107,7 +107,7 @@ def test_a_write_waits_once_for_one_that_does_not_answer(
         waits.append(timeout)
         return write(changes, timeout=timeout, **how)
 
-    monkeypatch.setattr(replica._declared[2], "_write_batch", note)
+    monkeypatch.setattr(replica._server, "_write_batch", note)
     outcome = ParamClient(network.command()).set("/a", 1)
     (wait,) = waits
     assert wait <= ACK_TIMEOUT - 1  # the silent one is given up after 1 s
@@ -128,7 +128,7 @@ def test_a_writer_whose_clock_is_behind_still_writes_last(network: Network) -> N
     session = network.command()
     session.clock = HybridClock(session.zid)
     client = ParamClient(session)
-    ahead = replica._core.session.clock
+    ahead = replica._session.clock
     ahead.observe(type(ahead.now())(ahead.now().time + 3600 * 10**9, "x"))
     replica.set("/a", "from an hour ahead")
     client.set("/a", "later")
@@ -140,7 +140,7 @@ def test_doing_a_write_again_much_later_changes_nothing(network: Network) -> Non
 
     replica = network.replica()
     session = network.session()
-    stamp = replica._core.session.stamp()
+    stamp = replica._session.stamp()
     batch = Batch.of((stamp.time, session.zid), "x", [(("a",), "old")])
     question = encode(ClientRequest("write", batch=batch, timeout=1))
     key = Keys(0).of(replica.zid, "set")
@@ -174,10 +174,22 @@ def test_a_follower_finds_what_it_missed(network: Network) -> None:
     replica.set("/a", 1)
     with client.follow() as follower:
         assert replica.members() == []
-        follower._subscriber.close()
+        follower._exchange._declared[0].close()
         replica.set("/a", 2)
-        follower._sync.compare_with_one()
+        assert follower._runner.call(lambda call, _: CompareCalled(call, TIMEOUT))
         eventually(lambda: follower.get("/a") == 2)
+
+
+def test_damaged_keys_are_reported_once(network: Network, caplog: pytest.LogCaptureFixture) -> None:
+    replica, other = network.replica(), network.session()
+    with ParamClient(network.command()).follow() as follower:
+        for _ in range(3):
+            other.put(f"@rosz/0/change/{replica.zid}/%zz", b"damaged")
+        replica.set("/a", 1)
+        eventually(lambda: follower.has("/a"))
+        told = "a replica wrote something that is not a parameter"
+        eventually(lambda: told in caplog.text)
+        assert "Traceback" not in caplog.text
 
 
 def test_many_may_write_at_once(network: Network, client: ParamClient) -> None:

@@ -4,21 +4,21 @@ import logging
 import re
 import threading
 import time
-from collections.abc import Collection
+from functools import partial
 from queue import SimpleQueue
 
 import pytest
 from network import TIMEOUT, eventually
 
-from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound
+from rosz.errors import ClosedError, InvalidName, ParamError, ParamNotFound, PartlyWritten
 from rosz.params.replica import Outcome, Replica
-from rosz.params.replica.broadcast import Delivery, PendingWrite
+from rosz.params.replica.core.effects import Publish
 from rosz.params.wire import (
     Batch,
     ClientRequest,
     Keys,
-    Member,
     Record,
+    ReplicaMember,
     SyncRequest,
     add_header,
     encode,
@@ -56,23 +56,6 @@ def test_a_set_that_returned_is_seen_by_all(network: Network) -> None:
         assert [replica.get("/count") for replica in replicas] == [number] * 4
 
 
-def test_nobody_waits_for_one_that_ends_as_it_is_counted(
-    network: Network, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first, second = network.replicas(2)
-    count = first._broadcaster.pending.open
-
-    def too_late(zids: Collection[str]) -> PendingWrite:
-        second.close()
-        eventually(lambda: first.members() == [] and not first._members.zids)
-        first._broadcaster.drop_peer(second.zid)
-        return count(zids)
-
-    monkeypatch.setattr(first._broadcaster.pending, "open", too_late)
-    assert first.set("/a", 1, timeout=TIMEOUT).slow == ()
-    assert not first._broadcaster.pending._lagging
-
-
 def test_a_newcomer_has_everything(network: Network) -> None:
     first = network.replica()
     first.set("/a/b", [1, {"c": "d"}])
@@ -89,8 +72,8 @@ def patient_joining(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have a replica that joins wait for ever for what does not come."""
     monkeypatch.setattr("rosz.params.replica.replica._MESH_TIMEOUT", 1e4)
     monkeypatch.setattr("rosz.params.replica.replica._TOKENS_TIMEOUT", 1e4)
-    monkeypatch.setattr("rosz.params.replica.sync._JOIN_TIMEOUT", 1e4)
-    monkeypatch.setattr("rosz.params.replica.sync._TIMEOUT", 1e4)
+    monkeypatch.setattr("rosz.params.replica.core.joining._TIMEOUT", 1e4)
+    monkeypatch.setattr("rosz.params.replica.core.comparisons._TIMEOUT", 1e4)
 
 
 @pytest.mark.usefixtures("patient_joining")
@@ -133,7 +116,7 @@ def test_a_stamp_years_ahead_stops_no_later_write(
 
 
 def test_what_is_not_taken_rests_until_who_refused_comes_anew(
-    network: Network, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    network: Network, caplog: pytest.LogCaptureFixture
 ) -> None:
     sessions = [network.session() for _ in range(2)]
     for session in sessions:
@@ -143,18 +126,22 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
     eventually(lambda: sessions[1].live_tokens(Keys(0).tokens, TIMEOUT) != [])
     other = network.join(sessions[1])
     eventually(lambda: len(one.members()) == 1)
-    monkeypatch.setattr(one._broadcaster, "send", lambda *_: Delivery((), {}))
-    other._declared[1].close()  # where it is told: rules leave such questions without an answer
-    merge(one, "/", {"a": {"b": 1, "c": 2}, "d": 3})
+    one._exchange._here[Publish] = bool
+    other._exchange._declared[
+        4
+    ].close()  # where it is told: rules leave such questions without an answer
+    merge(one, "/", {"a": {"b": 1, "c": 2}, "d": 3}, timeout=0)
     with caplog.at_level(logging.WARNING, "rosz.params"):
         assert one.compare(TIMEOUT)
         assert one.compare(TIMEOUT)
         key = f"{Keys(0).of(other.zid, 'tell')}/**"
-        network.keep(sessions[1].queryable(key, other._sync.on_writes, complete=True))
+        take = partial(other._exchange._on_query, other._exchange._on_writes)
+        network.keep(sessions[1].queryable(key, take, complete=True))
         assert one.compare(TIMEOUT)
     assert other.root == {}
     assert caplog.text.count("and 2 more, which differs there from now on") == 1
-    one._on_member(other._own, False)
+    with one._runner:
+        one._runner.core._comparisons.forget(other.zid)
     eventually(lambda: one.compare(TIMEOUT) and other.root == one.root)
     assert one.digest() == other.digest()
 
@@ -319,7 +306,7 @@ class Mute:
 
     def __init__(self, network: Network) -> None:
         self.session = session = network.session()
-        self.member = Member(1, session.zid, "mute program (pid 7 on elsewhere)")
+        self.member = ReplicaMember(1, session.zid, "mute program (pid 7 on elsewhere)")
         self.token = session.token(Keys(0).token(self.member))
         network.keep(self.token)
 
@@ -348,19 +335,19 @@ def test_a_replica_that_does_not_answer_is_named_once_and_then_not_waited_for(
     assert caplog.text.count("not yet known") == 1
 
 
-def test_a_write_that_a_replica_refuses_is_undone(network: Network) -> None:
+def test_a_write_that_a_replica_refuses_stands_and_its_writer_is_told(network: Network) -> None:
     right = network.replica(label="right")
     session = network.session()
     session.clock = SkewedClock(session.zid, 11 * 365.25 * 86_400)
     wrong = network.join(session)
     eventually(lambda: len(right.members()) == 1)
     right.set("/a", 1)
-    for name in ("/a", "/new/deep"):
-        with pytest.raises(ParamError) as caught:
-            wrong.set(name, 2, timeout=TIMEOUT)
-        assert f"'{name}' is not written, since right refuses it: " in str(caught.value)
-        assert "stamped 11.0 years ahead, expected at most 10" in str(caught.value)
-    assert wrong.root == right.root == {"a": 1}
+    with pytest.raises(PartlyWritten) as caught:
+        wrong.set("/a", 2, timeout=TIMEOUT)
+    assert str(caught.value).startswith("'/a' is written, but not kept at right: ")
+    assert "stamped 11.0 years ahead, expected at most 10" in str(caught.value)
+    assert caught.value.holders == 0
+    assert (wrong.root, right.root) == ({"a": 2}, {"a": 1})
 
 
 def test_a_replica_that_goes_is_not_waited_for(network: Network) -> None:
@@ -385,7 +372,7 @@ def test_joining_does_not_hang_on_a_replica_that_is_mute(network: Network) -> No
 
 def test_a_write_that_got_lost_is_told_once_more(network: Network) -> None:
     one, deaf = network.replicas(2)
-    deaf._broadcaster._declared[0].close()
+    deaf._exchange._declared[0].close()
     assert one.set("/a", 1, timeout=TIMEOUT).slow == ()
     assert deaf.get("/a") == 1
 
@@ -393,7 +380,7 @@ def test_a_write_that_got_lost_is_told_once_more(network: Network) -> None:
 def test_what_was_missed_is_found_by_comparing(network: Network) -> None:
     one, deaf = network.replicas(2)
     one.set("/old", 1)
-    for declared in (deaf._broadcaster._declared[0], deaf._broadcaster._declared[2]):
+    for declared in (deaf._exchange._declared[0], deaf._exchange._declared[2]):
         declared.close()
     for number in range(300):
         one.set(f"/n/{number}", number, timeout=0)
@@ -408,12 +395,13 @@ def test_what_was_missed_is_found_by_comparing(network: Network) -> None:
 
 def test_those_that_meet_again_compare_unasked(network: Network) -> None:
     one, deaf = network.replicas(2)
-    for declared in (deaf._broadcaster._declared[0], deaf._broadcaster._declared[2]):
+    for declared in (deaf._exchange._declared[0], deaf._exchange._declared[2]):
         declared.close()
     one.set("/a", 1, timeout=0)
-    deaf._members._on_token(Keys(0).token(one._own), False)
+    watch, token = deaf._runner.core._members._watch, Keys(0).token(deaf.members()[0])
+    deaf._tokens._on_token(watch, token, False)
     assert deaf.members() == []
-    deaf._members._on_token(Keys(0).token(one._own), True)
+    deaf._tokens._on_token(watch, token, True)
     eventually(lambda: deaf.has("/a"))
 
 

@@ -10,15 +10,19 @@ import threading
 import time
 from contextlib import closing
 from pathlib import Path
+from queue import SimpleQueue
 
 import pytest
 from hypothesis import given
 from network import TIMEOUT, eventually
 
-from rosz.errors import ParamError, StoreError
+from rosz.errors import PartlyWritten, StoreError
 from rosz.params.history import History
+from rosz.params.replica import Replica
+from rosz.params.replica.core.effects import Compact, Save
+from rosz.params.replica.core.events import Saved
 from rosz.params.replica.storage import Storage, StoreFile
-from rosz.params.writes import DELETED, Change, Write, put
+from rosz.params.writes import DELETED, Write, put
 
 from .network import Network
 from .strategies import writes
@@ -27,6 +31,9 @@ from .test_replica import Mute
 WRITER = """
 import sys
 from pathlib import Path
+from rosz.params.replica import Replica
+from rosz.params.replica.core.effects import Compact, Save
+from rosz.params.replica.core.events import Saved
 from rosz.params.replica.storage import StoreFile
 from rosz.params.writes import put
 store = StoreFile(Path(sys.argv[1]))
@@ -223,6 +230,12 @@ def test_a_replica_comes_back_with_its_file(network: Network, tmp_path: Path) ->
     assert loaded(path).root == {"a": 1, "late": 5}
 
 
+def forget_all(replica: Replica) -> int:
+    """Have a replica forget all deletions."""
+    with replica._runner as history:
+        return history.forget(0)
+
+
 def test_a_store_that_was_away_brings_nothing_back(network: Network, tmp_path: Path) -> None:
     path = tmp_path / "params"
     keeper = network.replica(storage=Storage(StoreFile(path)))
@@ -233,7 +246,7 @@ def test_a_store_that_was_away_brings_nothing_back(network: Network, tmp_path: P
     keeper.close()
     eventually(lambda: other.members() == [])
     other.delete("/gone")
-    assert other._state.forget(0) == 1
+    assert forget_all(other) == 1
     with closing(StoreFile(path)) as store:
         store.save([put(("mine",), (time.time_ns(), "c0"), "written while away")])
     again = network.replica(storage=Storage(StoreFile(path)))
@@ -252,12 +265,12 @@ def test_who_remembers_less_learns_what_others_have_forgotten(network: Network) 
     one, other = network.replicas(2)
     one.set("/gone", 1)
     one.delete("/gone")
-    assert one._state.forget(0) == 1
+    assert forget_all(one) == 1
     assert other.compare(10)
     late = network.replica()
     assert one.digest() == other.digest() == late.digest()
     for replica in (one, other, late):
-        with replica._state as history:
+        with replica._runner as history:
             history.apply([put(("gone",), (1, "c0"), 1)])
             assert history.root == {}
 
@@ -335,7 +348,7 @@ def test_what_comes_right_before_the_end_is_saved() -> None:
     disk = Disk()
     storage = Storage(disk)
     go_on = held(storage)
-    storage.save([put(("n",), (1, "c"), 1)])
+    storage.save(Save(1, [put(("n",), (1, "c"), 1)]))
     end = threading.Thread(target=storage.close)
     end.start()
     eventually(lambda: storage._worker.closed)
@@ -344,56 +357,46 @@ def test_what_comes_right_before_the_end_is_saved() -> None:
     assert [write.path for write in disk.kept] == [("n",)]
 
 
-def test_tidying_up_makes_nobody_wait() -> None:
+def test_what_is_done_is_told_in_order() -> None:
     disk = Disk()
     storage = Storage(disk)
-    go_on, safe = held(storage), threading.Event()
-    storage.when_stored(lambda _: safe.set())
-    storage.compact(lambda: ([], 0))
+    told: SimpleQueue[Saved] = SimpleQueue()
+    storage.on_saved = told.put
+    go_on = held(storage)
+    for number in (1, 2):
+        storage.save(Save(number, [put(("n",), (number, "c"), number)]))
+    storage.save(Compact(3, [put(("m",), (3, "c"), 3)], 0))
+    storage.save(Save(4, [put(("n",), (4, "c"), 4)]))
     go_on.set()
-    assert safe.wait(TIMEOUT)
+    assert [told.get(timeout=TIMEOUT).number for _ in range(3)] == [2, 3, 4]
+    assert [write.time for write in disk.kept] == [3, 4]
+    disk.full = True
+    storage.save(Save(5, [put(("n",), (5, "c"), 5)]))
+    assert told.get(timeout=TIMEOUT) == Saved(5, "no space left")
     storage.close()
 
 
-def test_a_disk_that_is_full_for_long_costs_no_memory() -> None:
-    disk = Disk(full=True)
-    storage = Storage(disk)
-    for number in range(1, 101):
-        storage.save([put(("n",), (number, "c"), number), put(("m",), (number, "c"), 0)])
-    eventually(lambda: not storage._worker.waiting and bool(storage._unsaved))
-    eventually(lambda: len(storage._unsaved) == 2)
-    disk.full = False
-    storage.save([put(("late",), (101, "c"), 1)])
-    storage.close()
-    assert [(write.path, write.time) for write in disk.kept] == [
-        (("n",), 100),
-        (("m",), 100),
-        (("late",), 101),
-    ]
-
-
-def test_a_full_disk_refuses_every_set(network: Network, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_full_disk_is_told_to_every_writer(
+    network: Network, caplog: pytest.LogCaptureFixture
+) -> None:
     disk = Disk()
     keeper = network.replica(storage=Storage(disk), label="keeper")
     other = network.replica(label="other")
     eventually(lambda: len(keeper.members()) == 1)
     other.set("/a", 1)
     disk.full = True
-    changes: list[Change] = [(("a",), 2), (("new", "deep"), 2), (("a",), DELETED)]
-    for replica in (keeper, other, keeper, other):
-        for change in changes:
-            with pytest.raises(
-                ParamError, match="' is not written, since keeper refuses it: no space left"
-            ):
-                replica.write([change], timeout=TIMEOUT)
-            assert keeper.root == other.root == {"a": 1}
+    for number, replica in enumerate((keeper, other, keeper, other)):
+        with pytest.raises(PartlyWritten) as caught:
+            replica.set("/a", number, timeout=TIMEOUT)
+        assert str(caught.value) == "'/a' is written, but not kept at keeper: no space left"
+        assert keeper.root == other.root == {"a": number}
     assert caplog.text.count("parameters cannot be saved") == 1
     disk.full = False
     eventually(lambda: "parameters are saved again" in caplog.text)
     other.set("/b", 2)
     history = History()
     history.apply(disk.kept)
-    assert history.root == keeper.root == other.root == {"a": 1, "b": 2}
+    assert history.root == keeper.root == other.root == {"a": 3, "b": 2}
 
 
 def test_a_file_that_cannot_grow_keeps_what_it_has(network: Network, tmp_path: Path) -> None:
@@ -402,13 +405,14 @@ def test_a_file_that_cannot_grow_keeps_what_it_has(network: Network, tmp_path: P
     replica = network.replica(storage=Storage(store))
     replica.set("/a", 1)
     store._base.execute("PRAGMA max_page_count = 1")
-    with pytest.raises(ParamError, match=f"cannot write '{path}': database or disk is full"):
+    with pytest.raises(PartlyWritten, match=f"cannot write '{path}': database or disk is full"):
         replica.set("/large", "x" * 100_000, timeout=TIMEOUT)
-    assert replica.root == {"a": 1}
+    assert sorted(replica.root) == ["a", "large"]
+    replica.set("/large", 1, timeout=0)
     store._base.execute("PRAGMA max_page_count = 10000")
-    replica.set("/b", 2)
+    replica.set("/b", 2, timeout=TIMEOUT)
     replica.close()
-    assert loaded(path).root == {"a": 1, "b": 2}
+    assert loaded(path).root == {"a": 1, "large": 1, "b": 2}
 
 
 def test_a_set_waits_for_replicas_and_the_disk_within_one_time(network: Network) -> None:

@@ -10,8 +10,9 @@ import pytest
 from network import TIMEOUT
 
 from rosz.params.replica import Changed
-from rosz.params.replica.watch import TreeChange, Watchers, is_same
-from rosz.params.writes import Write, put
+from rosz.params.replica.core.effects import TreeChanged
+from rosz.params.replica.watch import Watchers, is_same
+from rosz.params.writes import DELETED, Write, put
 
 from .network import Network, merge
 
@@ -135,7 +136,7 @@ def test_a_callback_that_hangs_piles_nothing_up(network: Network) -> None:
     one.watch("/a", hang)
     for number in range(100):
         one.set("/a", number)
-    worker = one._state.watchers._worker
+    worker = one._runner.watchers._worker
     assert worker is not None
     waiting = worker._queue.qsize()
     go_on.set()
@@ -158,6 +159,19 @@ def test_a_closed_watch_hears_no_more(network: Network) -> None:
     assert heard.empty()
 
 
+def test_a_deletion_below_a_leaf_tells_of_the_empty_dict() -> None:
+    """Another replica deletes ``/a/b/c`` while this one sets ``/a/b``."""
+    watchers = Watchers()
+    heard: SimpleQueue[Changed] = SimpleQueue()
+    for path in (("a",), ("a", "b"), ("a", "b", "c")):
+        watchers.add(path, heard.put)
+    write = put(("a", "b", "c"), (2, "c"), DELETED)
+    watchers.notify(TreeChanged({"a": {"b": 10}}, {"a": {"b": {}}}, [write]))
+    assert told(heard, 2) == [("/a/b", 10, {}), ("/a/b", 10, {})]
+    watchers.close()
+    assert heard.empty()
+
+
 def test_a_slow_callback_gets_the_newest_of_each_name() -> None:
     watchers = Watchers()
     release, entered = threading.Event(), threading.Event()
@@ -173,7 +187,7 @@ def test_a_slow_callback_gets_the_newest_of_each_name() -> None:
     for number in range(5000):
         write: Write = put(("a",), (number + 1, "c"), number)
         changed = {"a": number}
-        watchers.notify(TreeChange(root, changed, [write]))
+        watchers.notify(TreeChanged(root, changed, [write]))
         root = changed
         if number == 0:
             assert entered.wait(TIMEOUT)

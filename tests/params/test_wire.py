@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rosz.errors import DecodeError
-from rosz.params.replica.serve import is_key_in
 from rosz.params.values import normalise
 from rosz.params.wire import (
     Batch,
@@ -16,8 +15,8 @@ from rosz.params.wire import (
     ClientRequest,
     Index,
     Keys,
-    Member,
     Record,
+    ReplicaMember,
     SyncReply,
     SyncRequest,
     add_header,
@@ -29,6 +28,7 @@ from rosz.params.wire import (
     read_header,
 )
 from rosz.params.writes import DELETED, Write
+from rosz.session import is_key_in
 
 from .strategies import PATHS, VALUES, writes
 
@@ -154,10 +154,10 @@ def test_keys_of_a_domain() -> None:
 
 
 def test_tokens_carry_the_replica() -> None:
-    member = Member(12, "f0", "odd/*name (pid 3 on host)")
+    member = ReplicaMember(12, "f0", "odd/*name (pid 3 on host)")
     assert KEYS.member(KEYS.token(member)) == member
-    assert KEYS.member(KEYS.token(Member(12, "f0", ""))).label == "-"
-    assert Member(1, "ff", "x") < Member(2, "00", "x")
+    assert KEYS.member(KEYS.token(ReplicaMember(12, "f0", ""))).label == "-"
+    assert ReplicaMember(1, "ff", "x") < ReplicaMember(2, "00", "x")
     for token in ("@rosz/7/replica/f0", "@rosz/7/replica/f0/x/y", "@rosz/8/replica/f0/1/y", "a"):
         with pytest.raises(DecodeError):
             KEYS.member(token)

@@ -16,6 +16,7 @@ _XMLRPC = "XML-RPC servers and the node's registration with a master; rosz has n
 _LAUNCH = "roslaunch's XML-RPC between launches, and its threads; a launch here has one loop"
 
 _BUILD = "the generators that catkin calls in builds; rosz compiles definitions with rosz.idl"
+_ROSBUILD = "manifests and stacks of rosbuild; rospkg reads them"
 _PRIVATE = "sets or calls private names of rospy's modules"
 _SLAVE = "the slave API of nodes, which belongs to bridges to ROS 1"
 
@@ -66,6 +67,10 @@ INTERNAL = {
     ("test_genpy_base.py", "*"): _BUILD,
     ("test_genpy_gen*.py", "*"): _BUILD,
     ("test_genmsg_base.py", "*log"): _BUILD,
+    ("test_roslib_gentools.py", "*"): _BUILD,
+    ("test_roslib_manifest*.py", "*"): _ROSBUILD,
+    ("test_roslib_stack*.py", "*"): _ROSBUILD,
+    ("test_xmlrunner.py", "*"): "no public package imports rosunit's runner",
     ("test_genmsg_command_line.py", "*"): _BUILD,
     ("test_genmsg_gentools.py", "*"): _BUILD,
     ("test_genmsg_msg_loader.py", "*"): _BUILD,

@@ -11,7 +11,8 @@ from network import Network, eventually
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.sensor_msgs.msg import JointState
 from rosz.msgs.std_msgs.msg import Header
-from rosz.programs.robot_state_publisher import RobotError, read_links
+from rosz.programs.joint_state_publisher import DescriptionError
+from rosz.programs.robot_state_publisher import read_links
 from rosz.transforms import Monitor, to_rpy
 
 ROBOT = """<robot name="r">
@@ -58,7 +59,7 @@ def test_links_of_a_description() -> None:
     ],
 )
 def test_descriptions_that_cannot_be_used(text: str, message: str) -> None:
-    with pytest.raises(RobotError, match=message):
+    with pytest.raises(DescriptionError, match=message):
         read_links(text)
 
 

@@ -10,7 +10,7 @@ from network import TIMEOUT, Network
 from turtles.test_teleop import Terminal
 
 from rosz.msgs.geometry_msgs.msg import Twist, TwistStamped
-from rosz.programs.teleop_twist_keyboard import Driver
+from rosz.programs.teleop_twist_keyboard import KeyboardDriver
 
 
 def test_keys_are_commands(network: Network, capsys: pytest.CaptureFixture[str]) -> None:
@@ -18,7 +18,7 @@ def test_keys_are_commands(network: Network, capsys: pytest.CaptureFixture[str])
     node.params.set("~speed_limit", 0.52)
     heard: SimpleQueue[Twist] = SimpleQueue()
     user.subscription("cmd_vel", Twist, heard.put)
-    driver = Driver(node)
+    driver = KeyboardDriver(node)
     driver.wait()
 
     def press(key: str) -> tuple[float, float, float]:
@@ -42,7 +42,7 @@ def test_commands_with_a_stamp(network: Network) -> None:
     node.params.set("~frame_id", "base")
     node.params.set("~repeat_rate", 50.0)
     subscription = user.subscription("cmd_vel", TwistStamped)
-    Driver(node)
+    KeyboardDriver(node)
     first, second = subscription.get(TIMEOUT), subscription.get(TIMEOUT)
     assert first.header.frame_id == "base"
     assert second.header.stamp > first.header.stamp

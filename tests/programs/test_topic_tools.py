@@ -15,7 +15,7 @@ from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.topic_tools.srv import DemuxSelect, MuxSelect
 from rosz.node import Node
 from rosz.programs.topic_tools.mux import Demux, Mux
-from rosz.programs.topic_tools.relay import ByteLimit, PeriodLimit, Relay, Share
+from rosz.programs.topic_tools.relay import ByteLimit, PeriodLimit, RelayedTopic, Share
 
 from .sides import RealSide, RoszSide, run_script
 
@@ -96,7 +96,7 @@ def test_a_relay_passes_on_a_type_that_it_has_no_definition_of(network: Network)
     (folder / "package.xml").write_text("<package><name>secret_msgs</name></package>")
     (folder / "msg" / "Code.msg").write_text("string text\nint32 number\n")
     user = network.node("user", context=network.context(package_roots=(network.folder / "src",)))
-    Relay(network.node("relay"), "/in", "/out")
+    RelayedTopic(network.node("relay"), "/in", "/out")
     code = user.context.types.message("secret_msgs/Code")
     heard: SimpleQueue[Any] = SimpleQueue()
     user.subscription("/out", code, heard.put)
@@ -110,7 +110,7 @@ def test_a_relay_passes_on_a_type_that_it_has_no_definition_of(network: Network)
 def test_a_relay_of_a_latched_topic_latches(network: Network) -> None:
     user, relay = network.node("user"), network.node("relay")
     user.publisher("/in", String, latch=True).publish("kept")
-    Relay(relay, "/in", "/out")
+    RelayedTopic(relay, "/in", "/out")
     assert Heard(user, "/out").next() == "kept"
     assert Heard(network.node("late"), "/out").next() == "kept"
 
@@ -118,7 +118,7 @@ def test_a_relay_of_a_latched_topic_latches(network: Network) -> None:
 def test_a_lazy_relay_subscribes_while_it_has_subscribers(network: Network) -> None:
     user, relay = network.node("user"), network.node("relay")
     relay.params.set("~lazy", True)
-    Relay(relay, "/in", "/out")
+    RelayedTopic(relay, "/in", "/out")
     publisher = user.publisher("/in", String)
     publisher.wait_for_subscribers()
     publisher.publish("first")  # with which the output is announced
@@ -135,10 +135,11 @@ def test_a_stealthy_relay_hears_only_with_others(network: Network) -> None:
     user, relay = network.node("user"), network.node("relay")
     relay.params.set("~stealth", True)
     relay.params.set("~monitor_rate", 0.01)
-    Relay(relay, "/in", "/out")
+    RelayedTopic(relay, "/in", "/out")
     publisher = user.publisher("/in", String)
     publisher.wait_for_subscribers()
     heard = Heard(user, "/out")
+    await_subscribers(relay, "/out", "/user")  # the relay stops listening without any
     publisher.publish("first")
     assert heard.next() == "first"
     await_subscribers(user, "/in")
@@ -152,7 +153,7 @@ def test_a_stealthy_relay_hears_only_with_others(network: Network) -> None:
 
 def test_a_relay_of_a_topic_to_itself_is_refused(network: Network) -> None:
     with pytest.raises(SystemExit, match="the input and the output are both '/in'"):
-        Relay(network.node("relay"), "in", "/in")
+        RelayedTopic(network.node("relay"), "in", "/in")
 
 
 def test_a_lazy_mux_subscribes_to_what_is_selected(network: Network) -> None:

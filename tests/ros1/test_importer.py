@@ -143,19 +143,19 @@ def test_modules_by_all_their_names(tmp_path: Path) -> None:
     code = """
         from importlib import import_module
         from rosz.ros1.importer import install
-        from rosz.ros1.modules import MODULES, SUBMODULES
+        from rosz.ros1.modules import MODULES
         install()
-        for name in MODULES:
-            assert import_module(name) is import_module(f"rosz.ros1.{name}"), name
-        for name in SUBMODULES:
-            assert import_module(name).__name__ == name
+        for name, module in MODULES.items():
+            home = f"rosz.{module.home}" if module.home else name
+            assert import_module(name) is import_module(home), name
+            assert module.home or import_module(name).__name__ == name
         import roslib, rospkg.common
-        assert roslib.message.Message is import_module("rosz.ros1.genpy").Message
+        assert roslib.message.Message is import_module("rosz.ros1.client.genpy").Message
         assert rospkg.rospack.RosPack is roslib.rospack.RosPack is rospkg.RosPack
         import tf.transformations, tf_transformations
         from tf_transformations import quaternion_from_euler
         assert tf_transformations is tf.transformations
-        assert tf_transformations.__spec__.name == "rosz.ros1.tf.transformations"
+        assert tf_transformations.__spec__.name == "rosz.ros1.client.tf.transformations"
         import tf2_msgs.msg, tf.msg
         from tf.msg import *
         assert tfMessage is tf.msg.tfMessage is tf2_msgs.msg.TFMessage

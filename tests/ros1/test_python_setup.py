@@ -223,8 +223,9 @@ def test_what_was_read_is_kept_until_the_file_changes(workspace: Path, tmp_path:
     memory.write_text("not JSON")
     assert offers().find("plain") == tmp_path / "src" / "plain" / "src" / "plain"
     assert Offers(PackageIndex([tmp_path / "src"]), Path("/proc/none")).find("plain") is not None
+    single = Offers(PackageIndex([workspace / "src" / "single"]), tmp_path / "single.json")
+    assert single.find("one_file") is not None
     # catkin's own relay of such a module is not there in a devel space, only when it is installed.
-    assert Offers(PackageIndex([workspace / "src" / "single"])).find("one_file") is not None
 
 
 @pytest.mark.parametrize(

@@ -197,7 +197,8 @@ def test_errors_of_rosz_are_one_line_with_a_place(tmp_path: Path, line: str, tex
     assert text in done.stderr
 
 
-SLOW = "import os, sys, time\nos.write(1, b'loading\\n')\ntime.sleep(600)\n"
+# A signal right before one long sleep would be seen at its end.
+SLOW = "import os, sys, time\nos.write(1, b'loading\\n')\nwhile True: time.sleep(0.01)\n"
 
 
 @pytest.mark.parametrize("module", ["rosz.script", "rosz.ros1"])
@@ -232,7 +233,7 @@ def test_a_running_script_catches_ctrl_c(network: Network, module: str) -> None:
         "import time\n"
         "try:\n"
         "    print('begun', flush=True)\n"
-        "    time.sleep(600)\n"
+        "    while True: time.sleep(0.01)\n"
         "except KeyboardInterrupt:\n"
         "    print('caught')\n"
     )

@@ -7,7 +7,7 @@ import io
 import pytest
 from network import Network
 
-from rosz.ros1 import rosmsg, rosnode, rosparam, rosservice, rostopic
+from rosz.ros1.tools import rosmsg, rosnode, rosparam, rosservice, rostopic
 
 
 def test_output_goes_to_the_stdout_of_the_caller(capsys: pytest.CaptureFixture[str]) -> None:

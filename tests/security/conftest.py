@@ -9,7 +9,7 @@ from hosts.conftest import world
 from hosts.host import Host
 from hosts.world import World
 
-from rosz.security.authority import Authority
+from rosz.security import Authority
 
 __all__ = ("authority", "pair", "world")
 

@@ -10,9 +10,7 @@ import pytest
 from cli.command import rosz
 
 from rosz.errors import UsageError, YamlError
-from rosz.security import KeyFolder
-from rosz.security.authority import Authority
-from rosz.security.review import review
+from rosz.security import Authority, KeyFolder, review_keys
 from rosz.wire import Endpoint
 
 
@@ -66,7 +64,7 @@ def test_files_that_anybody_may_write_are_refused(authority: Authority, name: st
     (home / name).chmod(0o666)
     with pytest.raises(UsageError, match=rf"anybody may write '.*{name}' \(mode 0666\)"):
         KeyFolder.find(home, "robot")
-    assert any("anybody may write" in line for line in review(authority.folder).wrong)
+    assert any("anybody may write" in line for line in review_keys(authority.folder).wrong)
 
 
 @pytest.mark.parametrize("kind", ["pipe", "folder", "loose link", "no text", "deep"])
@@ -83,7 +81,7 @@ def test_rules_that_cannot_be_read(authority: Authority, kind: str) -> None:
         file.write_bytes(b"\xff\xfe" if kind == "no text" else b"[" * 9999)
     with pytest.raises((UsageError, YamlError), match=r"rules\.yaml"):
         KeyFolder.find(home, "robot")
-    assert any("rules.yaml" in line for line in review(authority.folder).wrong)
+    assert any("rules.yaml" in line for line in review_keys(authority.folder).wrong)
 
 
 def test_impossible_lifetimes(authority: Authority) -> None:
@@ -141,7 +139,7 @@ def test_names_of_holders(authority: Authority, name: str) -> None:
 def test_review_of_a_good_folder(authority: Authority) -> None:
     authority.add("robot", ["10.0.0.5"])
     (authority.folder / "rules.yaml").write_text("robot: {publish: [/a], set: [/b]}\n")
-    found = review(authority.folder)
+    found = review_keys(authority.folder)
     assert [(holder.name, holder.places) for holder in found.holders] == [("robot", ("10.0.0.5",))]
     assert found.rules[0].allowed == {"robot": ["publish /a", "set /b"]}
     assert found.wrong == []
@@ -156,7 +154,7 @@ def test_review_of_mistakes(authority: Authority, tmp_path: Path) -> None:
     own = (authority.folder / "authority" / "certificate.pem").read_bytes()
     (authority.folder / "strange" / "authority.pem").write_bytes(own)
     (authority.folder / "rules.yaml").write_text("nobody: all\n")
-    wrong = "\n".join(review(authority.folder).wrong)
+    wrong = "\n".join(review_keys(authority.folder).wrong)
     for part in (
         "'late' ends on",
         "'gone' ended on",
@@ -170,7 +168,7 @@ def test_review_of_mistakes(authority: Authority, tmp_path: Path) -> None:
 def test_review_takes_its_date_from_the_caller(authority: Authority) -> None:
     authority.add("robot", days=100)
     then = dt.datetime.now(dt.UTC) + dt.timedelta(days=101)
-    assert any("'robot' ended on" in line for line in review(authority.folder, then).wrong)
+    assert any("'robot' ended on" in line for line in review_keys(authority.folder, then).wrong)
 
 
 @pytest.mark.parametrize(

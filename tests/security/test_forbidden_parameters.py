@@ -5,31 +5,34 @@ from __future__ import annotations
 import pytest
 from hosts.host import Host
 
-from rosz.security.authority import Authority
+from rosz.security import Authority
 
 WRITER = """
     import logging, sys, time
     import rosz
     from rosz.params import condense, spread
-    from rosz.params.replica import sync
+    from rosz.params.replica import exchange
+    from rosz.params.replica.core import replica_core
+    from rosz.params.replica.core.effects import Publish
     logging.basicConfig()
-    sync._COMPARE_EVERY = (0.2, 0.2)
-    sync._TICK = 0.2
-    send = sync._Comparison._send
+    replica_core._COMPARE_EVERY = (0.2, 0.2)
+    replica_core._TICK_SECONDS = 0.2
+    query = exchange.Exchange._query
 
-    def sent(self, writes):
-        print("sent", len(writes), min(write.path for write in writes), flush=True)
-        send(self, writes)
+    def sent(self, effect):
+        if effect.paths:
+            print("sent", len(effect.paths), min(effect.paths), flush=True)
+        query(self, effect)
 
-    sync._Comparison._send = sent
+    exchange.Exchange._query = sent
     with rosz.Node("writer") as node:
         store = node.context.params
-        store._broadcaster.send = lambda *_: ((), {})  # as if the link were cut
+        store._exchange._here[Publish] = bool  # as if the link were cut
         store.write(condense(spread("/", {
             "gains": {f"g{n}": n for n in range(2000)},
             "secrets": {"pin": 1, "word": "x"},
             "gains_too": 1,
-        })))
+        })), timeout=0)
         print("wrote", flush=True)
         for line in sys.stdin:
             for _ in range(int(line)):

@@ -6,7 +6,7 @@ import pytest
 from hosts.host import Host, HostProgram
 from network import TIMEOUT, eventually
 
-from rosz.security.authority import Authority
+from rosz.security import Authority
 
 from .test_links import ROBOT
 

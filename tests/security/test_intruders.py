@@ -11,7 +11,7 @@ from hosts.scripts import slack
 from hosts.world import World
 from network import TIMEOUT, eventually
 
-from rosz.security.authority import Authority
+from rosz.security import Authority
 
 VICTIM = """
 import rosz

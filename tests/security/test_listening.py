@@ -8,7 +8,7 @@ from hosts.scripts import LISTENER, TALKER
 from hosts.world import World
 from network import eventually
 
-from rosz.security.authority import Authority
+from rosz.security import Authority
 from rosz.session import connect_endpoint, listen_endpoints
 
 ONE = "127.0.0.1 localhost\n"

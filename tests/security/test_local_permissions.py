@@ -8,10 +8,7 @@ import pytest
 from hosts.host import Host
 from hosts.world import World
 
-from rosz.security import LocalPermissions
-from rosz.security.authority import Authority
-from rosz.security.folder import KeyFolder
-from rosz.security.rules import read_rules
+from rosz.security import Authority, KeyFolder, LocalPermissions, read_rules
 from rosz.wire import Kind
 
 RULES = """

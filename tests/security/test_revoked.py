@@ -10,9 +10,8 @@ from hosts.host import Host, HostProgram
 from hosts.world import World
 
 from rosz.errors import UsageError
+from rosz.security import Authority, review_keys
 from rosz.security import authority as authority_module
-from rosz.security.authority import Authority
-from rosz.security.review import review
 
 ROBOT = """
     import rosz
@@ -149,7 +148,7 @@ def test_whom_an_authority_revokes(authority: Authority) -> None:
     assert len(authority_module.excluded_names(again.certificate)) == 2
     desk = (authority.folder / "desk" / "authority.pem").read_bytes()
     assert desk == (authority.folder / "authority" / "certificate.pem").read_bytes()
-    assert [holder.name for holder in review(authority.folder).holders] == ["desk"]
+    assert [holder.name for holder in review_keys(authority.folder).holders] == ["desk"]
     for name in ("robt", "authority", "../desk"):
         with pytest.raises(UsageError, match=f"'{name}' has no keys in "):
             authority.revoke(name)

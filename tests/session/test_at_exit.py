@@ -34,6 +34,35 @@ def test_a_thread_that_leaves_late_is_waited_for(network: Network) -> None:
     assert program.lines == ["has left"]
 
 
+def test_a_thread_of_zenoh_that_has_removed_its_queue_is_waited_for(network: Network) -> None:
+    """The Python runtime would abort the program if the thread returned to Python after the end."""
+    program = network.program(
+        """
+        import threading, time
+        from rosz.session import at_exit, channels
+        from rosz.node import Context
+
+        late = threading.Event()
+
+        class Open(set):
+            def discard(self, queue):
+                super().discard(queue)
+                if threading.current_thread().name.endswith("(pyo3-closure)"):
+                    print("leaves")
+                    late.set()
+                    time.sleep(1)  # the thread is slow
+                    print("has left")
+
+        at_exit.OPEN = channels.OPEN = Open()
+        with Context() as context:
+            context.session.watch_tokens("a/*", lambda *change: None)
+        late.wait()
+        """
+    )
+    assert program.exit_code() == 0
+    assert program.lines.count("has left") == program.lines.count("leaves") > 0
+
+
 class Entity:
     """What Zenoh returns for a declaration."""
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from network import Network
 
-from rosz.bags.buffer import Channels
+from rosz.bags.record.queue import Channels
 from rosz.session import PullSubscriber, Session
 
 SMALL, LARGE = 10, 1000

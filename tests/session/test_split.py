@@ -1,35 +1,35 @@
-"""Differences between what cores know, and how long they have been there."""
+"""ViewDifferences between what cores know, and how long they have been there."""
 
 from __future__ import annotations
 
-from rosz.session.split import Differences
+from rosz.session.stale_links import ViewDifferences
 
 ONE, TWO = "1a", "2b"
 
 
 def test_what_stays_different_is_found_in_time() -> None:
-    differences = Differences(15)
+    differences = ViewDifferences(15)
     assert differences.update({ONE: 1}, {TWO: {ONE: 1, TWO: 5}}, 100) is None
     assert differences.update({ONE: 1}, {TWO: {ONE: 1, TWO: 5}}, 114) is None
     assert differences.update({ONE: 1}, {TWO: {ONE: 1, TWO: 5}}, 115) == (TWO, TWO)
 
 
 def test_what_changes_meanwhile_is_not() -> None:
-    differences = Differences(15)
+    differences = ViewDifferences(15)
     for second in range(100):
         theirs = {ONE: 1, TWO: second}
         assert differences.update({ONE: 1, TWO: second - 1}, {TWO: theirs}, second) is None
 
 
 def test_what_agrees_in_between_is_not() -> None:
-    differences = Differences(15)
+    differences = ViewDifferences(15)
     assert differences.update({ONE: 1}, {TWO: {}}, 0) is None
     assert differences.update({ONE: 1}, {TWO: {ONE: 1}}, 10) is None
     assert differences.update({ONE: 1}, {TWO: {}}, 20) is None
 
 
 def test_who_lacks_something_acts_first() -> None:
-    has, lacks = Differences(15), Differences(15)
+    has, lacks = ViewDifferences(15), ViewDifferences(15)
     for second, expected in ((0, None), (15, None), (30, (TWO, ONE))):
         assert has.update({ONE: 1}, {TWO: {}}, second) == expected
     for second, found in ((0, None), (15, (TWO, ONE))):
@@ -37,7 +37,7 @@ def test_who_lacks_something_acts_first() -> None:
 
 
 def test_a_core_that_replies_no_more() -> None:
-    differences = Differences(15)
+    differences = ViewDifferences(15)
     assert differences.update({}, {TWO: None}, 0) is None
     assert differences.update({}, {TWO: None}, 15) == (TWO, "")
     assert differences.update({}, {}, 16) is None

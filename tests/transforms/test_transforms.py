@@ -38,7 +38,7 @@ from rosz.msgs.std_msgs.msg import Header
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import Clock
 from rosz.qos import CLOCK
-from rosz.ros1.point_cloud2 import create_cloud_xyz32, read_points
+from rosz.ros1.client.point_cloud2 import create_cloud_xyz32, read_points
 from rosz.transforms import (
     IDENTITY,
     Buffer,

@@ -18,7 +18,7 @@ from rosz.msgs.sensor_msgs.msg import Imu, JointState, LaserScan
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.msgs.tf2_msgs.msg import TFMessage
 from rosz.node import Node
-from rosz.turtlebot3_sim.simulator import Simulator
+from rosz.turtlebot3_sim.simulator import Turtlebot3Simulator
 
 WAYPOINTS = ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
 
@@ -43,7 +43,7 @@ def start(network: Network, **params: object) -> Node:
     user = network.node("user")
     for name, value in params.items():
         user.params[f"/turtlebot3_sim/{name}"] = value
-    Simulator(network.node("turtlebot3_sim"))
+    Turtlebot3Simulator(network.node("turtlebot3_sim"))
     user.context.graph.wait_for(
         lambda view: bool(view.servers("/gazebo/reset_world")), TIMEOUT, "the simulation"
     )
@@ -142,7 +142,7 @@ def test_wrong_parameters(network: Network, name: str, value: object, text: str)
     node = network.node("turtlebot3_sim")
     node.params[f"~{name}"] = value
     with pytest.raises(RoszError, match=text):
-        Simulator(node)
+        Turtlebot3Simulator(node)
 
 
 def test_through_the_waypoints_of_the_tutorial(network: Network) -> None:

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rosz.turtlesim.world import Field, Point, span
+from rosz.turtlesim.world import Canvas, Point, span
 
 BLACK, WHITE = (0, 0, 0), (255, 255, 255)
 SIZE = 24
 near = st.floats(-40, 60).map(lambda value: round(value, 2))
 
 
-def drawn(field: Field) -> set[tuple[int, int]]:
+def drawn(field: Canvas) -> set[tuple[int, int]]:
     """Return the pixels that are white."""
     return {
         (x, y)
@@ -37,7 +37,7 @@ def distance(pixel: tuple[int, int], start: Point, end: Point) -> float:
 
 @given(st.tuples(near, near), st.tuples(near, near), st.integers(1, 30))
 def test_a_line_covers_pixels_within_half_its_width(start: Point, end: Point, width: int) -> None:
-    field = Field(SIZE, SIZE, BLACK)
+    field = Canvas(SIZE, SIZE, BLACK)
     field.line(start, end, width, WHITE)
     white = drawn(field)
     for y in range(SIZE):
@@ -49,7 +49,7 @@ def test_a_line_covers_pixels_within_half_its_width(start: Point, end: Point, wi
 
 @pytest.mark.parametrize("width", [1, 2, 3, 10])
 def test_straight_lines_are_as_wide_as_asked(width: int) -> None:
-    field = Field(60, 60, BLACK)
+    field = Canvas(60, 60, BLACK)
     field.line((-10, 30), (70, 30), width, WHITE)
     assert len({y for _, y in drawn(field)}) == width
     field.fill(BLACK)
@@ -58,26 +58,26 @@ def test_straight_lines_are_as_wide_as_asked(width: int) -> None:
 
 
 def test_a_line_without_length_is_a_dot() -> None:
-    field = Field(9, 9, BLACK)
+    field = Canvas(9, 9, BLACK)
     field.line((4, 4), (4, 4), 3, WHITE)
     assert drawn(field) == {(x, y) for x in (3, 4, 5) for y in (3, 4, 5)}
 
 
 def test_lines_far_outside_are_invisible_and_cheap() -> None:
-    field = Field(9, 9, BLACK)
+    field = Canvas(9, 9, BLACK)
     field.line((1e30, 1e30), (2e30, -1e30), 3, WHITE)
     assert drawn(field) == set()
 
 
 def test_colors_by_the_nearest_pixel_and_the_edge() -> None:
-    field = Field(4, 4, BLACK)
+    field = Canvas(4, 4, BLACK)
     field.line((3, 0), (3, 0), 1, WHITE)
     assert field.color_at(2.5, 0.4) == field.color_at(99, -99) == WHITE
     assert field.color_at(2.4, 0.4) == field.color_at(3, 0.5) == BLACK
 
 
 def test_every_change_is_a_new_version() -> None:
-    field = Field(4, 4, BLACK)
+    field = Canvas(4, 4, BLACK)
     versions = [field.version]
     field.line((0, 0), (1, 1), 1, WHITE)
     versions.append(field.version)
@@ -87,7 +87,7 @@ def test_every_change_is_a_new_version() -> None:
 
 
 def test_a_copy_is_independent() -> None:
-    field = Field(4, 3, BLACK)
+    field = Canvas(4, 3, BLACK)
     copy = field.copy()
     field.fill(WHITE)
     assert (copy.width, copy.height, drawn(copy)) == (4, 3, set())

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rosz.errors import NotFoundError, UsageError
-from rosz.turtlesim.world import BACKGROUND, SIZE, START, STEP_SECONDS, Field, Pen, Turtle, World
+from rosz.turtlesim.world import BACKGROUND, SIZE, START, STEP_SECONDS, Canvas, Pen, Turtle, World
 
 BLUE = (69, 86, 255)
 MIDDLE = SIZE / 2
@@ -17,11 +17,11 @@ speeds = st.floats(-50, 50)
 
 
 @pytest.fixture
-def field() -> Field:
-    return Field(500, 500, BLUE)
+def field() -> Canvas:
+    return Canvas(500, 500, BLUE)
 
 
-def run(turtle: Turtle, field: Field, steps: int, start: float = 0.0) -> None:
+def run(turtle: Turtle, field: Canvas, steps: int, start: float = 0.0) -> None:
     for number in range(steps):
         turtle.step(field, start + number * STEP_SECONDS)
 
@@ -31,7 +31,7 @@ def test_the_field_has_the_size_of_ros1() -> None:
     assert 1 / STEP_SECONDS == 62.5
 
 
-def test_straight_ahead_for_a_second_and_no_longer(field: Field) -> None:
+def test_straight_ahead_for_a_second_and_no_longer(field: Canvas) -> None:
     turtle = Turtle(2.0, 3.0, 0.0)
     turtle.command(0.0, forward=2.0, left=0.0, turn=0.0)
     run(turtle, field, 63)
@@ -42,7 +42,7 @@ def test_straight_ahead_for_a_second_and_no_longer(field: Field) -> None:
     assert (turtle.speed, turtle.turn, turtle.y) == (0.0, 0.0, 3.0)
 
 
-def test_strafing_goes_to_the_left(field: Field) -> None:
+def test_strafing_goes_to_the_left(field: Canvas) -> None:
     turtle = Turtle(5.0, 5.0, math.pi / 6)
     turtle.command(0.0, forward=3.0, left=4.0, turn=0.0)
     turtle.step(field, 0.0)
@@ -52,7 +52,7 @@ def test_strafing_goes_to_the_left(field: Field) -> None:
     assert turtle.speed == 5.0
 
 
-def test_a_circle_ends_where_it_began(field: Field) -> None:
+def test_a_circle_ends_where_it_began(field: Canvas) -> None:
     turtle = Turtle(MIDDLE, MIDDLE, 0.0)
     turns = 2 * math.pi / (100 * STEP_SECONDS)
     for number in range(100):
@@ -66,7 +66,7 @@ def test_a_circle_ends_where_it_began(field: Field) -> None:
 def test_it_stays_on_the_field_and_its_heading_in_one_turn(
     forward: float, left: float, turn: float, theta: float
 ) -> None:
-    field = Field(500, 500, BLUE)
+    field = Canvas(500, 500, BLUE)
     turtle = Turtle(MIDDLE, MIDDLE, theta)
     for _ in range(5):
         turtle.command(0.0, forward=forward, left=left, turn=turn)
@@ -76,13 +76,13 @@ def test_it_stays_on_the_field_and_its_heading_in_one_turn(
         assert -math.pi <= turtle.theta < math.pi
 
 
-def test_half_a_turn_counts_as_minus_pi(field: Field) -> None:
+def test_half_a_turn_counts_as_minus_pi(field: Canvas) -> None:
     turtle = Turtle(5.0, 5.0, math.pi)
     turtle.step(field, 0.0)
     assert turtle.theta == -math.pi
 
 
-def test_a_wall_stops_it_and_its_goal_is_returned(field: Field) -> None:
+def test_a_wall_stops_it_and_its_goal_is_returned(field: Canvas) -> None:
     turtle = Turtle(SIZE - 0.01, 5.0, 0.0)
     turtle.command(0.0, forward=2.0, left=0.0, turn=0.0)
     assert turtle.step(field, 0.0) == pytest.approx((SIZE - 0.01 + 2 * STEP_SECONDS, 5.0))
@@ -91,7 +91,7 @@ def test_a_wall_stops_it_and_its_goal_is_returned(field: Field) -> None:
     assert turtle.step(field, 0.0) is None
 
 
-def test_teleports_happen_in_order_at_the_next_step(field: Field) -> None:
+def test_teleports_happen_in_order_at_the_next_step(field: Canvas) -> None:
     turtle = Turtle(1.0, 1.0, 0.0)
     turtle.teleport_to(4.0, 4.0, 0.0)
     turtle.teleport_by(2.0, math.pi / 2)
@@ -102,7 +102,7 @@ def test_teleports_happen_in_order_at_the_next_step(field: Field) -> None:
     assert field.color_at(4.0 * 45, (SIZE - 5.0) * 45) == turtle.pen.color
 
 
-def test_a_teleport_beyond_the_field_ends_at_the_wall(field: Field) -> None:
+def test_a_teleport_beyond_the_field_ends_at_the_wall(field: Canvas) -> None:
     turtle = Turtle(1.0, 1.0, 0.0)
     turtle.teleport_to(99.0, 99.0, 0.0)
     # As in ROS 1, only what is too far up counts as being at the wall from the start.
@@ -110,7 +110,7 @@ def test_a_teleport_beyond_the_field_ends_at_the_wall(field: Field) -> None:
     assert (turtle.x, turtle.y) == (SIZE, SIZE)
 
 
-def test_the_pen_draws_unless_it_is_off(field: Field) -> None:
+def test_the_pen_draws_unless_it_is_off(field: Canvas) -> None:
     turtle = Turtle(1.0, 5.0, 0.0, pen=Pen((1, 2, 3), 7))
     turtle.teleport_to(3.0, 5.0, 0.0)
     turtle.step(field, 0.0)
@@ -124,7 +124,7 @@ def test_the_pen_draws_unless_it_is_off(field: Field) -> None:
     assert field.color_at(4.5 * 45, row) == BLUE
 
 
-def test_the_color_sensor_ignores_the_new_line(field: Field) -> None:
+def test_the_color_sensor_ignores_the_new_line(field: Canvas) -> None:
     turtle = Turtle(1.0, 5.0, 0.0)
     turtle.teleport_to(3.0, 5.0, 0.0)
     turtle.command(0.0, forward=10.0, left=0.0, turn=0.0)

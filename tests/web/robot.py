@@ -231,8 +231,6 @@ new MutationObserver(() => {
 """
 """Notifications disappear after seconds, in which a busy machine may not look at the page."""
 _SEEN = "return [document.body.innerText, ...window.notified].join('\\n')"
-_HARMLESS = re.compile(r'^INFO .*"(reloading because |connection timed out, falling back)')
-"""A page that the browser was too busy to keep connected is loaded again."""
 
 
 def _start(options: Any) -> Any:
@@ -422,5 +420,7 @@ class World:
 
     def messages(self) -> list[str]:
         """Return what is on the console of the browser, and forget it."""
-        found = [f"{one['level']} {one['message']}" for one in self.browser.get_log("browser")]
-        return [one for one in found if not _HARMLESS.search(one)]
+        entries = [f"{one['level']} {one['message']}" for one in self.browser.get_log("browser")]
+        # INFO are remarks: that a button took no focus from a field where somebody is, and that a
+        # page which the browser was too busy to keep connected is loaded again.
+        return [text for text in entries if not text.startswith("INFO ")]

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network, eventually
 
+from rosz.access import PagePolicy
 from rosz.errors import NotFoundError, UsageError, YamlError
 from rosz.introspect.rosout import LogFilter
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
@@ -24,18 +25,17 @@ from rosz.msgs.sensor_msgs.msg import BatteryState, Image
 from rosz.msgs.std_msgs.msg import Float64MultiArray, Header, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.web.model import (
-    Condition,
-    Driver,
+    FieldCondition,
     FloorPlan,
     Form,
     ImageWatch,
     LogBook,
-    Parameters,
-    Permission,
+    ParameterModel,
     Plot,
     Sending,
     System,
     TopicWatch,
+    VelocityPublisher,
     call_service,
     find_floor,
     form_of,
@@ -129,7 +129,7 @@ def test_a_watched_topic_keeps_the_newest_message(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     publisher = robot.publisher("chatter", String, latch=True)
     publisher.publish(String(data="first"))
-    system = System(page, Permission())
+    system = System(page, PagePolicy())
     graph = system.graph.use().value
     eventually(lambda: graph.survey().view.publishers("/chatter"), "the publisher")
     watch = TopicWatch(page, graph.survey(), "/chatter")
@@ -151,8 +151,8 @@ def test_a_page_publishes_once_and_at_a_rate(network: Network) -> None:
 
     robot.subscription("cmd_vel", Twist, receive)
     with pytest.raises(UsageError, match="read-only"):
-        Sending(page, Permission(read_only=True), "/cmd_vel", "geometry_msgs/Twist")
-    sending = Sending(page, Permission(), "/cmd_vel", "geometry_msgs/Twist")
+        Sending(page, PagePolicy(read_only=True), "/cmd_vel", "geometry_msgs/Twist")
+    sending = Sending(page, PagePolicy(), "/cmd_vel", "geometry_msgs/Twist")
     sending.send("linear: {x: 1}")
     eventually(lambda: got == [1.0], "the message")
     sending.repeat("linear: {x: 2}", 50)
@@ -173,12 +173,12 @@ def test_driving_ends_when_the_browser_is_silent(network: Network) -> None:
             stopped.set()
 
     robot.subscription("cmd_vel", Twist, receive, queue_size=100)
-    driver = Driver(page, Permission(), "/cmd_vel")
+    driver = VelocityPublisher(page, PagePolicy(), "/cmd_vel")
     driver.drive(0.5, 0.0)
     assert stopped.wait(TIMEOUT)
-    assert not driver.driving
+    assert not driver._driving
     with pytest.raises(UsageError, match="read-only"):
-        Driver(page, Permission(read_only=True), "/cmd_vel")
+        VelocityPublisher(page, PagePolicy(read_only=True), "/cmd_vel")
     driver.close()
 
 
@@ -199,7 +199,7 @@ def test_images_are_pictures(network: Network, encoding: str, size: int, value: 
     robot, page = network.node("robot"), network.node("page")
     image = Image(height=2, width=4, encoding=encoding, step=4 * size, data=bytes([7] * 8 * size))
     robot.publisher("camera", Image, latch=True).publish(image)
-    graph = System(page, Permission()).graph.use().value
+    graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/camera"), "the publisher")
     watch = ImageWatch(page, graph.survey(), "/camera")
     eventually(lambda: watch.received, "the image")
@@ -216,15 +216,15 @@ def test_a_page_calls_a_service(network: Network) -> None:
     robot.service("enable", SetBool, lambda request: SetBool.Response(True, f"is {request.data}"))
     page.context.graph.wait_for_service("/enable", TIMEOUT)
     view = page.context.graph.refresh()
-    answer = call_service(page, Permission(), view, "/enable", "data: true")
+    answer = call_service(page, PagePolicy(), view, "/enable", "data: true")
     assert 'message: "is True"' in answer
     with pytest.raises(UsageError, match="read-only"):
-        call_service(page, Permission(read_only=True), view, "/enable", "")
+        call_service(page, PagePolicy(read_only=True), view, "/enable", "")
 
 
 def test_parameters_keep_their_types(network: Network) -> None:
     page = network.node("page")
-    parameters = Parameters(page, Permission())
+    parameters = ParameterModel(page, PagePolicy())
     page.params.set("/rate", 2.5)
     page.params.set("/name", "arm")
     parameters.set_text("/rate", "3")
@@ -246,7 +246,7 @@ def test_parameters_keep_their_types(network: Network) -> None:
 
 def test_parameters_are_saved_and_loaded(network: Network) -> None:
     page = network.node("page")
-    parameters = Parameters(page, Permission())
+    parameters = ParameterModel(page, PagePolicy())
     assert parameters.load("/", "arm: {speed: 1, joints: [a, b]}\nname: robot\n", "file.yaml") == 3
     text = parameters.save("/arm")
     page.params.delete("/arm")
@@ -255,14 +255,14 @@ def test_parameters_are_saved_and_loaded(network: Network) -> None:
     with pytest.raises(YamlError, match=r"file\.yaml"):
         parameters.load("/", "a: [", "file.yaml")
     with pytest.raises(UsageError, match="read-only"):
-        Parameters(page, Permission(read_only=True)).load("/", "a: 1", "file.yaml")
+        ParameterModel(page, PagePolicy(read_only=True)).load("/", "a: 1", "file.yaml")
 
 
 def test_fields_are_plotted_while_a_page_wants_them(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     publisher = robot.publisher("twist", Twist)
     arrays = robot.publisher("array", Float64MultiArray)
-    graph = System(page, Permission()).graph.use().value
+    graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: len(graph.survey().view.publishers("/array")) == 1, "the publishers")
     eventually(lambda: len(graph.survey().view.publishers("/twist")) == 1, "the publishers")
     plot = Plot(page)
@@ -331,7 +331,7 @@ def test_fields_of_numbers_are_offered() -> None:
 def test_the_stamp_in_the_header_is_the_time_where_that_is_chosen(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     publisher = robot.publisher("pose", PoseStamped)
-    graph = System(page, Permission()).graph.use().value
+    graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/pose"), "the publisher")
     plot = Plot(page, stamped=True)
     assert "pose/position/x" in plot.offered(graph.survey())["/pose"]
@@ -405,13 +405,13 @@ def test_a_robot_is_found_beside_its_velocities(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     odometry = robot.publisher("tb3/odom", Odometry)
     robot.publisher("tb3/scan", String)
-    graph = System(page, Permission()).graph.use().value
+    graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/tb3/scan"), "the publishers")
     eventually(lambda: graph.survey().view.publishers("/tb3/odom"), "the publishers")
     assert find_floor(graph.survey(), "/cmd_vel") == {}
     topics = find_floor(graph.survey(), "/tb3/cmd_vel")
     assert topics == {"odom": "/tb3/odom"}
-    floor = FloorPlan(page, Permission(), topics)
+    floor = FloorPlan(page, PagePolicy(), topics)
 
     def is_drawn() -> bool:
         odometry.publish(Odometry())
@@ -433,23 +433,23 @@ def test_a_robot_is_found_beside_its_velocities(network: Network) -> None:
     ],
 )
 def test_conditions_compare_a_field_with_a_value(text: str, holds: bool) -> None:
-    assert Condition(text).accepts(Twist(linear=Vector3(x=1.0))) is holds
+    assert FieldCondition(text).accepts(Twist(linear=Vector3(x=1.0))) is holds
 
 
 def test_conditions_are_no_programs() -> None:
-    assert Condition("data contains 'go'").accepts(String(data="let it go"))
-    assert Condition("data != go").accepts(String(data="stay"))
+    assert FieldCondition("data contains 'go'").accepts(String(data="let it go"))
+    assert FieldCondition("data != go").accepts(String(data="stay"))
     for text in ("__import__('os').getcwd()", "m.data", "data >", ""):
         with pytest.raises(UsageError, match="expected a field"):
-            Condition(text)
+            FieldCondition(text)
 
 
 def test_only_messages_that_fulfil_a_condition_are_kept(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     publisher = robot.publisher("cmd_vel", Twist)
-    graph = System(page, Permission()).graph.use().value
+    graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/cmd_vel"), "the publisher")
-    watch = TopicWatch(page, graph.survey(), "/cmd_vel", Condition("linear/x > 1"))
+    watch = TopicWatch(page, graph.survey(), "/cmd_vel", FieldCondition("linear/x > 1"))
     number = 0
 
     def arrived() -> bool:

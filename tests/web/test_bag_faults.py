@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from network import TIMEOUT, Network, eventually
 
+from rosz.access import PagePolicy
 from rosz.msgs.std_msgs.msg import String
-from rosz.web.model import BagCommand, BagRun, Bags, Permission, PlayOrder, RecordOrder
+from rosz.web.model import BagCommand, BagRun, Bags, PlayOrder, RecordOrder
 from rosz.web.pages.bags import fault_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(240)]
@@ -24,7 +25,7 @@ def bags(network: Network, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> B
     for name, value in network.variables().items():
         monkeypatch.setenv(name, value)
     network.node("robot").publisher("big", String, latch=True).publish(String("x" * 200_000))
-    return Bags(tmp_path, Permission())
+    return Bags(tmp_path, PagePolicy())
 
 
 def recorded(bags: Bags, name: str) -> BagRun:
@@ -51,7 +52,7 @@ def test_processes_that_stand_still_are_killed(bags: Bags, monkeypatch: pytest.M
     eventually(lambda: player.last.paused, "the player", LONG)
     monkeypatch.setattr("rosz.web.model.bags._SILENT_SECONDS", 2.0)
     for run in (second, player):
-        os.kill(run.pid, signal.SIGSTOP)
+        os.kill(run._process.pid, signal.SIGSTOP)
     for run in (second, player):
         eventually(lambda run=run: run.silent, "its silence", LONG)  # type: ignore[misc]
         assert fault_of(run) == "Its process does not respond; 'Stop' kills it."

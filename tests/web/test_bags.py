@@ -14,10 +14,11 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 import rosz.bags
+from rosz.access import PagePolicy
 from rosz.errors import BagError, NotFoundError, UsageError
 from rosz.msgs.std_msgs.msg import Int32
 from rosz.security import Permit
-from rosz.web.model import BagCommand, BagRun, Bags, Permission, PlayOrder, RecordOrder
+from rosz.web.model import BagCommand, BagRun, Bags, PlayOrder, RecordOrder
 
 LONG = 4 * TIMEOUT
 
@@ -50,7 +51,7 @@ def here(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_only_bags_of_the_folder_are_reachable(folder: Path) -> None:
-    bags = Bags(folder, Permission())
+    bags = Bags(folder, PagePolicy())
     assert {one.name: one.finished for one in bags.folder.rows()} == {
         "a.mcap": True,
         "two": True,
@@ -67,7 +68,7 @@ def test_only_bags_of_the_folder_are_reachable(folder: Path) -> None:
 
 
 def test_a_bag_is_described_and_deleted(folder: Path) -> None:
-    bags = Bags(folder, Permission())
+    bags = Bags(folder, PagePolicy())
     summary, problems = bags.folder.summary("a.mcap")
     assert (summary.messages, summary.duration, problems) == (100, 99.0, [])
     assert bags.open("a.mcap") == (folder / "a.mcap", None)
@@ -78,7 +79,7 @@ def test_a_bag_is_described_and_deleted(folder: Path) -> None:
 
 
 def test_a_folder_of_rosbag2_is_sent_as_an_archive(folder: Path) -> None:
-    _, pieces = Bags(folder, Permission()).open("two")
+    _, pieces = Bags(folder, PagePolicy()).open("two")
     assert pieces is not None
     with tarfile.open(fileobj=io.BytesIO(b"".join(pieces))) as archive:
         names = archive.getnames()
@@ -91,7 +92,7 @@ def test_a_folder_of_rosbag2_is_sent_as_an_archive(folder: Path) -> None:
 
 
 def test_permissions_hold_for_bags(folder: Path) -> None:
-    look = Bags(folder, Permission(read_only=True))
+    look = Bags(folder, PagePolicy(read_only=True))
     for use in (
         lambda: look.record(RecordOrder(name="x.mcap")),
         lambda: look.play(PlayOrder(name="a.mcap")),
@@ -102,7 +103,7 @@ def test_permissions_hold_for_bags(folder: Path) -> None:
         with pytest.raises(UsageError, match="this page is read-only"):
             use()
     assert look.open("a.mcap")
-    some = Bags(folder, Permission(Permit(subscribe=("/other",), control=True)))
+    some = Bags(folder, PagePolicy(Permit(subscribe=("/other",), control=True)))
     with pytest.raises(UsageError, match="subscribe '/count'"):
         some.open("a.mcap")
     with pytest.raises(UsageError, match="subscribe all topics; choose some"):
@@ -110,13 +111,13 @@ def test_permissions_hold_for_bags(folder: Path) -> None:
     with pytest.raises(UsageError, match="publish '/old/count'"):
         some.play(PlayOrder(name="a.mcap", prefix="/old"))
     with pytest.raises(UsageError, match="let this page delete bags"):
-        Bags(folder, Permission(Permit())).delete("a.mcap")
+        Bags(folder, PagePolicy(Permit())).delete("a.mcap")
 
 
 @pytest.mark.parametrize("name", ["../x.mcap", "/x.mcap", ".x.mcap", "x.txt", "a/b.bag"])
 def test_a_recording_stays_in_the_folder(folder: Path, name: str) -> None:
     with pytest.raises(UsageError, match="is not the name of a bag in this folder"):
-        Bags(folder, Permission()).record(RecordOrder(name=name))
+        Bags(folder, PagePolicy()).record(RecordOrder(name=name))
 
 
 def _ended(run: BagRun | None) -> BagRun:
@@ -127,7 +128,7 @@ def _ended(run: BagRun | None) -> BagRun:
 
 @pytest.mark.usefixtures("here")
 def test_a_recorder_does_not_give_way_as_pages_do(tmp_path: Path) -> None:
-    bags = Bags(tmp_path, Permission())
+    bags = Bags(tmp_path, PagePolicy())
     order = RecordOrder(name="run.mcap", topics=("/count",))
 
     def record() -> None:
@@ -138,13 +139,14 @@ def test_a_recorder_does_not_give_way_as_pages_do(tmp_path: Path) -> None:
     thread.start()
     thread.join()
     assert bags.recording is not None
-    assert os.getpriority(os.PRIO_PROCESS, bags.recording.pid) == os.getpriority(os.PRIO_PROCESS, 0)
+    pid = bags.recording._process.pid
+    assert os.getpriority(os.PRIO_PROCESS, pid) == os.getpriority(os.PRIO_PROCESS, 0)
     bags.close()
 
 
 @pytest.mark.usefixtures("here")
 def test_a_recording_goes_on_until_it_is_stopped(network: Network, tmp_path: Path) -> None:
-    bags = Bags(tmp_path, Permission())
+    bags = Bags(tmp_path, PagePolicy())
     count = network.node("robot").publisher("count", Int32)
     bags.record(RecordOrder(name="run.mcap", topics=("/count",)))
     recording = bags.recording
@@ -174,7 +176,7 @@ def test_a_page_that_ends_leaves_a_whole_bag_and_a_dead_recorder_is_told(
 ) -> None:
     robot = network.node("robot")
     robot.publisher("map", Int32, latch=True).publish(Int32(data=1))
-    bags = Bags(tmp_path, Permission())
+    bags = Bags(tmp_path, PagePolicy())
     bags.record(RecordOrder(name="run.mcap", topics=("/map",)))
     first = bags.recording
     assert first is not None
@@ -186,7 +188,7 @@ def test_a_page_that_ends_leaves_a_whole_bag_and_a_dead_recorder_is_told(
     second = bags.recording
     assert second is not None
     eventually(lambda: second.last.messages >= 1, "the latched message", LONG)
-    os.kill(second.pid, signal.SIGKILL)
+    os.kill(second._process.pid, signal.SIGKILL)
     assert "ended with code -9" in _ended(second).fault
 
 
@@ -194,7 +196,7 @@ def test_a_page_that_ends_leaves_a_whole_bag_and_a_dead_recorder_is_told(
 def test_a_bag_is_played_by_the_bar(network: Network, folder: Path) -> None:
     heard: list[int] = []
     network.node("ear").subscription("/old/count", Int32, lambda one: heard.append(one.data))
-    bags = Bags(folder, Permission())
+    bags = Bags(folder, PagePolicy())
     with pytest.raises(UsageError, match="no bag plays"):
         bags.control(BagCommand("pause"))
     bags.play(PlayOrder(name="a.mcap", prefix="/old", paused=True))
@@ -219,7 +221,7 @@ def test_a_bag_is_played_by_the_bar(network: Network, folder: Path) -> None:
 
 
 def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
-    bags = Bags(tmp_path / "none", Permission())
+    bags = Bags(tmp_path / "none", PagePolicy())
     with pytest.raises(BagError, match="cannot read the folder"):
         bags.folder.rows()
     with pytest.raises(BagError, match="cannot start its process"):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from network import Network, eventually
 
+from rosz.access import PagePolicy
 from rosz.environment import Environment
 from rosz.errors import NotFoundError, UsageError
 from rosz.introspect.subscribe import topic_types
@@ -28,31 +31,48 @@ from rosz.msgs.geometry_msgs.msg import (
     WrenchStamped,
 )
 from rosz.msgs.nav_msgs.msg import GridCells, Odometry
-from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, Imu
+from rosz.msgs.sensor_msgs.msg import (
+    CameraInfo,
+    ChannelFloat32,
+    Image,
+    Imu,
+    LaserScan,
+    PointCloud,
+    PointCloud2,
+    PointField,
+    Range,
+)
 from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY
-from rosz.web.model import Frames, Permission, System
+from rosz.web.model import Frames, System
 from rosz.web.scene import (
     Look,
     Meshes,
-    Setup,
+    SceneSetup,
     format_setup,
     list_displays,
     open_display,
     read_setup,
 )
 from rosz.web.scene.depth import draw_depth
-from rosz.web.scene.detections import draw_boxes, draw_polygons
 from rosz.web.scene.display import FrameDisplay
 from rosz.web.scene.drawing import Drawing
-from rosz.web.scene.poses import Trail, draw_cells
+from rosz.web.scene.poses import (
+    Trail,
+    draw_boxes,
+    draw_cells,
+    draw_imu,
+    draw_pair,
+    draw_polygons,
+)
 from rosz.web.scene.robot import RobotDisplay
-from rosz.web.scene.sensors import draw_camera
-from rosz.web.scene.vectors import draw_accel, draw_imu, draw_twist, draw_wrench
+from rosz.web.scene.sensors import draw_camera, draw_old_cloud
 
 from .test_scene import ASIDE, parts
 
 FLAT = Quaternion(0, 0, 0, 1)
+FORCES = ("wrench", "force", "torque")
+PARTS = ("linear", "angular")
 URDF = """<robot name="r"><link name="base"><visual><geometry><box size="1 1 1"/></geometry>
 <material name="wood"><texture filename="package://r/wood.png"/></material></visual></link>
 </robot>"""
@@ -87,20 +107,26 @@ def test_cells_and_wrenches_are_drawn() -> None:
     assert np.allclose(cubes["matrices"][:, :2, 3], [(1, 2), (2, 2)])
     drawing = Drawing()
     wrench = WrenchStamped(wrench=Wrench(force=Vector3(3, 4, 0), torque=Vector3(0, 0, 2)))
-    assert draw_wrench(wrench, IDENTITY, Look("/w"), drawing) == "force 5.00, torque 2.00"
+    assert draw_pair(FORCES, wrench, IDENTITY, Look("/w"), drawing) == "force 5.00, torque 2.00"
     force, torque = parts(drawing)
     assert np.allclose(force["matrices"][0, :3, 3], (1.5, 2, 0))
     assert np.allclose(torque["matrices"][0, :3, 3], (0, 0, 1))
-    draw_wrench(WrenchStamped(), IDENTITY, Look("/w"), Drawing())
+    draw_pair(FORCES, WrenchStamped(), IDENTITY, Look("/w"), Drawing())
 
 
 def test_speeds_accelerations_and_inertial_sensors_are_drawn() -> None:
     drawing = Drawing()
     twist = TwistStamped(twist=Twist(linear=Vector3(3, 4, 0), angular=Vector3(0, 0, 2)))
-    assert draw_twist(twist, IDENTITY, Look("/v"), drawing) == "linear 5.00, angular 2.00"
+    assert (
+        draw_pair(("twist", *PARTS), twist, IDENTITY, Look("/v"), drawing)
+        == "linear 5.00, angular 2.00"
+    )
     assert len(parts(drawing)) == 2
     accel = AccelStamped(accel=Accel(linear=Vector3(0, 1, 0)))
-    assert draw_accel(accel, IDENTITY, Look("/a"), Drawing()) == "linear 1.00, angular 0.00"
+    assert (
+        draw_pair(("accel", *PARTS), accel, IDENTITY, Look("/a"), Drawing())
+        == "linear 1.00, angular 0.00"
+    )
     drawing = Drawing()
     imu = Imu(orientation=FLAT, linear_acceleration=Vector3(0, 0, 9.8))
     assert draw_imu(imu, IDENTITY, Look("/imu"), drawing) == "acceleration 9.80"
@@ -140,7 +166,7 @@ def test_recognised_things_are_drawn() -> None:
 
 
 def test_an_address_holds_what_stays_and_the_prefix() -> None:
-    setup = Setup("map", (Look("/odom", keep=7), Look("robot", prefix="tb3_0")))
+    setup = SceneSetup("map", (Look("/odom", keep=7), Look("robot", prefix="tb3_0")))
     assert format_setup(setup) == "/3d?frame=map&show=/odom;keep=7,robot;prefix=tb3_0"
     assert read_setup("map", "/odom;keep=7,robot;prefix=tb3_0", "") == setup
     assert read_setup("", "/odom;keep=-1;prefix=", "").looks == (Look("/odom"),)
@@ -151,7 +177,7 @@ def test_images_and_trails_of_topics_are_displayed(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     camera = robot.publisher("camera", Image, latch=True)
     odom = robot.publisher("odom", Odometry)
-    system = System(page, Permission())
+    system = System(page, PagePolicy())
     graph = system.graph.use().value
     eventually(lambda: graph.survey().view.publishers("/odom"), "the odometry")
     eventually(lambda: graph.survey().view.publishers("/camera"), "the camera")
@@ -180,6 +206,60 @@ def test_images_and_trails_of_topics_are_displayed(network: Network) -> None:
     eventually(all_drawn, "three poses")
     for one in (image, display, frames):
         one.close()
+
+
+def test_infinite_and_absurd_values_warn_of_nothing(network: Network) -> None:
+    """numpy would write to the terminal of ``rosz web``; in tests, a warning is an error."""
+    robot, page = network.node("robot"), network.node("page")
+    system = System(page, PagePolicy())
+    frames = Frames(page)
+    meshes = Meshes(Environment.read({}), lambda _: "")
+    values = (math.inf, 1.0, math.nan, -math.inf, 1e38, -1e38)
+    header = Header(frame_id="odom")
+    channel = ChannelFloat32(name="intensity", values=list(values))
+    fields = [PointField(name=name, offset=0, datatype=8, count=1) for name in "xyz"]
+    sent = (
+        LaserScan(header=header, range_max=math.inf, ranges=list(values), intensities=list(values)),
+        PointCloud(header=header, points=[Point32(x=x) for x in values], channels=[channel]),
+        PointCloud2(
+            header=header,
+            height=1,
+            width=2,
+            point_step=8,
+            row_step=16,
+            fields=fields,
+            data=np.array([1e308, 1.0]).tobytes(),
+        ),
+        Range(header=header, range=1e38, field_of_view=math.pi),
+    )
+    graph = system.graph.use().value
+
+    def show(topic: str, message: Any) -> None:
+        robot.publisher(topic, type(message), latch=True).publish(message)
+        eventually(lambda: graph.survey().view.publishers(topic), "the topic")
+        display = open_display(system, graph.survey(), frames, meshes, Look(topic))
+        eventually(lambda: display.refresh("odom"), "the message")
+        display.encoded()
+        assert display.status, topic
+        display.close()
+
+    for number, message in enumerate(sent):
+        show(f"/t{number}", message)
+    assert draw_old_cloud(sent[1], IDENTITY, Look("/c"), Drawing()) == "3 points"
+    frames.close()
+
+
+@pytest.mark.parametrize("encoding", ["32FC1", "64FC1"])
+def test_infinite_pixels_warn_of_nothing(encoding: str) -> None:
+    pytest.importorskip("cv2")
+    from rosz.images import pixels
+
+    kind = {"32FC1": np.float32, "64FC1": np.float64}[encoding]
+    image = np.array([[math.inf, 1.0], [math.nan, -math.inf]], kind)
+    message = Image(
+        height=2, width=2, encoding=encoding, step=2 * image.itemsize, data=image.tobytes()
+    )
+    assert pixels(message, deep=False).shape == (2, 2)
 
 
 def test_no_frame_says_what_to_start(network: Network) -> None:
@@ -246,7 +326,7 @@ def test_points_of_depths_have_the_colors_of_an_image(network: Network) -> None:
     depths.publish(Image(header, height=1, width=2, encoding="32FC1", step=8, data=one))
     picture = bytes((255, 0, 0, 0, 0, 255)) * 2
     colors.publish(Image(height=1, width=4, encoding="rgb8", step=12, data=picture))
-    system = System(page, Permission())
+    system = System(page, PagePolicy())
     graph = system.graph.use().value
     names = {"/camera/depth", "/camera/camera_info", "/rgb"}
     eventually(lambda: names <= set(topic_types(graph.survey().view)), "the camera")

@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network, eventually
 
-from rosz.actions import ActionServer
+from rosz.access import PagePolicy
+from rosz.actions import ActionlibServer
 from rosz.errors import ActionError, EncodeError, NotFoundError, UsageError
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.msgs.example_interfaces.action import Fibonacci
-from rosz.web.model import ActionRow, Actions, Permission, System
+from rosz.web.model import ActionRow, Actions, System
 from rosz.web.model.actions import SentGoal
 
 
@@ -28,7 +29,7 @@ class Robot:
         self._feedback = message("actionlib_tutorials/FibonacciFeedback")
         self._result = message("actionlib_tutorials/FibonacciResult")
         action = message("actionlib_tutorials/FibonacciAction")
-        server = ActionServer(node, "old", action, self._receive, self._cancel, has_ros2=False)
+        server = ActionlibServer(node, "old", action, self._receive, self._cancel, has_ros2=False)
         server.start()
 
     def _execute(self, goal: Any) -> None:
@@ -63,7 +64,7 @@ class Page:
 
     def __init__(self, network: Network, **permission: Any) -> None:
         node = network.node("page")
-        self._system = System(node, Permission(**permission))
+        self._system = System(node, PagePolicy(**permission))
         self._graph = self._system.graph.use()
         self.actions: Actions = self._system.actions
         eventually(lambda: len(self.rows()) == 2, "both actions")
@@ -79,6 +80,10 @@ class Page:
 
     def use(self, name: str) -> Any:
         return self.actions.use(self._graph.value.survey().view, name)
+
+    def is_used(self) -> bool:
+        """Return whether pages or goals use a client of an action."""
+        return any(port._users for port in self.actions._ports.values())
 
 
 BOTH = pytest.mark.parametrize(
@@ -113,7 +118,7 @@ def test_a_goal_is_followed_to_its_result(
     assert goal.result == "sequence: [0, 1, 1]"
     assert goal.feedback() == [(1, "sequence: [0, 1]")]
     assert page.actions.goals(name) == [goal]
-    eventually(lambda: page.actions.users == 0, "no client is left")
+    eventually(lambda: not page.is_used(), "no client is left")
 
 
 @BOTH
@@ -150,7 +155,7 @@ def test_what_does_not_work_is_said(page: Page, robot: Robot) -> None:
     eventually(lambda: goal.done, "the end of the goal")
     with pytest.raises(ActionError, match="does not cancel the goal"):
         page.cancel("/fib", goal.id)
-    eventually(lambda: page.actions.users == 0, "no client is left")
+    eventually(lambda: not page.is_used(), "no client is left")
 
 
 def test_a_page_that_is_read_only_sends_no_goal(network: Network, robot: Robot) -> None:
@@ -175,7 +180,7 @@ with rosz.Node("robot") as node:
 """
     )
     server.wait_for("ready", TIMEOUT)
-    system = System(network.node("page"), Permission())
+    system = System(network.node("page"), PagePolicy())
     graph = system.graph.use().value
     eventually(lambda: system.actions.rows(graph.survey().view), "the action")
     goal = system.actions.send(graph.survey().view, "/fib", "")

@@ -14,7 +14,7 @@ SERVER = """
 import sys
 import rosz.web.pages.graph as page
 from rosz.node import Node
-from rosz.web import Settings, open_page
+from rosz.web import PageSettings, open_page
 
 make_picture, write_svg, running = page.make_picture, page.write_svg, []
 
@@ -40,7 +40,7 @@ def write_when_told(picture, *rest):
 
 page.make_picture, page.write_svg = tell_what_is_made, write_when_told
 with Node("rosz_web_slow") as node:
-    server, (address, *_) = open_page(node, Settings(port=0))
+    server, (address, *_) = open_page(node, PageSettings(port=0))
     print("the page is at", address, flush=True)
     node.context.wait_for_shutdown()
 """

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from network import Network, eventually
 
+from rosz.access import PagePolicy
 from rosz.environment import Environment
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import (
@@ -32,7 +33,7 @@ from rosz.msgs.visualization_msgs.msg import (
 )
 from rosz.node import Node
 from rosz.transforms import StaticTransformBroadcaster
-from rosz.web.model import Frames, Permission, System
+from rosz.web.model import Frames, System
 from rosz.web.scene import HandleDisplay, Held, Look, Meshes, open_display
 from rosz.web.scene.handles import default_markers
 
@@ -61,7 +62,7 @@ def held(name: str, event: str, x: float = 0.0) -> Held:
     return Held("/h/update", name, "c", event, (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (x, 1.0, 0.0))
 
 
-def open_handles(page: Node, frames: Frames, permission: Permission) -> HandleDisplay:
+def open_handles(page: Node, frames: Frames, permission: PagePolicy) -> HandleDisplay:
     """Return the display of the server in the namespace /h, once it is there."""
     system = System(page, permission)
     graph = system.graph.use().value
@@ -108,7 +109,7 @@ def test_handles_are_drawn_and_moved(network: Network) -> None:
         InteractiveMarkerInit("s", 1, [marker("a", 1.0, Control.MOVE_AXIS, box), marker("b", 2, 2)])
     )
     frames = Frames(page)
-    display = open_handles(page, frames, Permission())
+    display = open_handles(page, frames, PagePolicy())
 
     def cube() -> dict[str, Any] | None:
         display.refresh("odom")
@@ -172,7 +173,7 @@ def test_a_page_that_may_not_publish_moves_nothing(network: Network) -> None:
     box = Marker(type=Marker.CUBE, scale=Vector3(1, 1, 1))
     full.publish(InteractiveMarkerInit("s", 1, [marker("a", 1.0, Control.MOVE_AXIS, box)]))
     frames = Frames(page)
-    display = open_handles(page, frames, Permission(read_only=True))
+    display = open_handles(page, frames, PagePolicy(read_only=True))
 
     def drawn() -> list[dict[str, Any]]:
         display.refresh("map")

@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 from network import Network
 
+from rosz.access import PagePolicy
 from rosz.errors import LaunchError, UsageError
 from rosz.security import Permit
-from rosz.web.model import Launches, NodeOutput, Permission, RunningLaunch
+from rosz.web.model import Launches, NodeOutput, RunningLaunch
 
 from .robot import LONG, World, eventually, open_browser, set_screen, take_picture
 
@@ -45,7 +46,7 @@ class Site:
         self.program = network.run("-m", "rosz", "launch", launch_file(folder, size))
         self.program.wait_for("process[loud-2]: started", LONG)
         self.node = network.node("page")
-        self.launches = Launches(self.node, Permission())
+        self.launches = Launches(self.node, PagePolicy())
         eventually(lambda: self.launches.found, "the launch", LONG)
 
     @property
@@ -77,10 +78,10 @@ def test_a_killed_node_is_restarted(site: Site) -> None:
     site.launches.act(site.launch.key, "restart", "/talker")
     eventually(lambda: site.pid("/talker") not in {0, first}, "another talker", LONG)
     with pytest.raises(UsageError, match="read-only"):
-        Launches(site.node, Permission(read_only=True)).act(site.launch.key, "stop", "/talker")
+        Launches(site.node, PagePolicy(read_only=True)).act(site.launch.key, "stop", "/talker")
     with pytest.raises(UsageError, match="the rules of this machine do not let this page"):
-        Launches(site.node, Permission(Permit())).act(site.launch.key, "stop", "/talker")
-    assert not Permission(Permit()).sees_launches
+        Launches(site.node, PagePolicy(Permit())).act(site.launch.key, "stop", "/talker")
+    assert not PagePolicy(Permit()).sees_launches
 
 
 def test_a_required_node_is_stopped_and_the_last_one_ends_the_launch(site: Site) -> None:

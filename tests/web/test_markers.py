@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from network import Network, eventually
 
+from rosz.access import PagePolicy
 from rosz.environment import Environment
 from rosz.errors import UsageError
 from rosz.msgs.builtin_interfaces.msg import Duration
@@ -18,7 +19,7 @@ from rosz.msgs.std_msgs.msg import ColorRGBA, Header
 from rosz.msgs.visualization_msgs.msg import Marker, MarkerArray
 from rosz.transforms import IDENTITY
 from rosz.transforms import Pose as Place
-from rosz.web.model import Frames, Permission, System
+from rosz.web.model import Frames, System
 from rosz.web.scene import Look, Meshes
 from rosz.web.scene.drawing import Drawing
 from rosz.web.scene.markers import MarkerDisplay, draw_marker
@@ -229,7 +230,7 @@ def test_the_links_of_a_robot_are_drawn(meshes: Meshes) -> None:
 def test_markers_come_and_go(network: Network, meshes: Meshes) -> None:
     robot, page = network.node("robot"), network.node("page")
     publisher = robot.publisher("markers", MarkerArray)
-    graph = System(page, Permission()).graph.use().value
+    graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/markers"), "the publisher")
     frames = Frames(page)
     display = MarkerDisplay(page, graph.survey(), Look("/markers"), frames, meshes)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 from network import Network, eventually
 
+from rosz.access import PagePolicy
 from rosz.errors import UsageError
 from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import String
 from rosz.security import Permit
-from rosz.web.model import Permission, Shared, System
+from rosz.web.model import SharedResource, System
 from rosz.wire import Kind
 
 
@@ -22,7 +23,7 @@ class _Door:
 
 
 def test_the_last_user_closes_what_the_first_one_opened() -> None:
-    shared = Shared(_Door)
+    shared = SharedResource(_Door)
     first, second = shared.use(), shared.use()
     door = first.value
     assert second.value is door
@@ -38,23 +39,23 @@ def test_the_last_user_closes_what_the_first_one_opened() -> None:
 
 def test_a_page_that_is_read_only_says_so() -> None:
     with pytest.raises(UsageError, match="this page is read-only: it may not publish '/a'"):
-        Permission(read_only=True).check("publish", "/a")
-    Permission(read_only=True).check("subscribe", "/a")
+        PagePolicy(read_only=True).check("publish", "/a")
+    PagePolicy(read_only=True).check("subscribe", "/a")
     with pytest.raises(UsageError, match="the rules of this machine do not let"):
-        Permission(Permit()).check("set", "/a")
+        PagePolicy(Permit()).check("set", "/a")
     with pytest.raises(UsageError, match="control '/robot'"):
-        Permission(Permit()).check_control("/robot")
+        PagePolicy(Permit()).check_control("control '/robot'")
 
 
 def test_topics_are_measured_while_somebody_looks(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     chatter, camera = robot.publisher("chatter", String), robot.publisher("camera", Image)
-    system = System(page, Permission())
+    system = System(page, PagePolicy())
     graph, traffic = system.graph.use(), system.traffic.use()
 
     def measured() -> set[str]:
         traffic.value.update(graph.value.survey())
-        return {one for one in ("/chatter", "/camera") if traffic.value.is_measured(one)}
+        return {one for one in ("/chatter", "/camera") if one in traffic.value._taps}
 
     eventually(lambda: measured() == {"/chatter"}, "only the light topic is measured")
 
@@ -74,7 +75,7 @@ def test_topics_are_measured_while_somebody_looks(network: Network) -> None:
         traffic.close()
         graph.close()
         eventually(lambda: not _own(followed.view().tokens, page.name), "no subscription is left")
-    assert system.observed == 0
+    assert not any(getattr(part, "_users", 0) for part in vars(system).values())
     camera.close()
 
 

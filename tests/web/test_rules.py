@@ -24,13 +24,13 @@ import sys
 from pathlib import Path
 from rosz.node import Node
 from rosz.security import read_rules
-from rosz.web.guard import Guard
-from rosz.web.model import Permission
+from rosz.web.middleware import AccessMiddleware
+from rosz.access import PagePolicy
 from rosz.web.server import PageServer
 rules = read_rules(sys.argv[1], "rules.yaml")
 with Node("web") as node:
-    permission = Permission(rules.permit_at_bridge("web"))
-    server = PageServer(node, "127.0.0.1", 0, permission=permission, guard=Guard(),
+    permission = PagePolicy(rules.permit_at_bridge("web"))
+    server = PageServer(node, "127.0.0.1", 0, permission=permission, middleware=AccessMiddleware(),
                         bags=Path(sys.argv[2]))
     print(f"the page is at http://127.0.0.1:{server.port}", flush=True)
     sys.stdin.readline()

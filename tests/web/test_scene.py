@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from network import Network, eventually
 
+from rosz.access import PagePolicy
 from rosz.environment import Environment
 from rosz.errors import UsageError
 from rosz.msgs.builtin_interfaces.msg import Time
@@ -31,12 +32,12 @@ from rosz.msgs.nav_msgs.msg import MapMetaData, OccupancyGrid, Path
 from rosz.msgs.sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from rosz.msgs.std_msgs.msg import Header
 from rosz.transforms import IDENTITY, Pose, StaticTransformBroadcaster, TransformBroadcaster
-from rosz.web.model import Frames, Permission, System
+from rosz.web.model import Frames, System
 from rosz.web.scene import (
     TOOLS,
     Look,
     Meshes,
-    Setup,
+    SceneSetup,
     Tools,
     format_setup,
     open_display,
@@ -89,15 +90,15 @@ def cloud_of(rows: Any, names: str = "xyz", **changes: Any) -> PointCloud2:
 
 
 def test_an_address_holds_the_setup() -> None:
-    setup = Setup("map", (Look("tf"), Look("/scan", "#ff0000", 4, visible=False)), "top")
+    setup = SceneSetup("map", (Look("tf"), Look("/scan", "#ff0000", 4, visible=False)), "top")
     address = format_setup(setup)
     assert address == "/3d?frame=map&show=tf,/scan;color=%23ff0000;size=4;hidden&view=top"
     assert read_setup("map", "tf,/scan;color=#ff0000;size=4;hidden", "top") == setup
     assert [one.name for one in read_setup("", "", "").looks] == ["grid", "tf"]
-    axes = Setup("map", (Look("axes", frame="a/b", radius=0.5), Look("grid", cells=20)))
+    axes = SceneSetup("map", (Look("axes", frame="a/b", radius=0.5), Look("grid", cells=20)))
     assert format_setup(axes) == "/3d?frame=map&show=axes;frame=a/b;radius=0.5,grid;cells=20"
     assert read_setup("map", "axes;frame=/a/b;radius=0.5,grid;cells=20", "") == axes
-    assert read_setup("", "/a;size=much", "elsewhere") == Setup("", (Look("/a"),), "orbit")
+    assert read_setup("", "/a;size=much", "elsewhere") == SceneSetup("", (Look("/a"),), "orbit")
     assert read_setup("", "/a;size=nan", "").looks == (Look("/a"),)
 
 
@@ -158,21 +159,21 @@ def test_a_map_has_the_colors_of_rviz() -> None:
     origin = PoseMessage(Point(-1, -2, 0), Quaternion(0, 0, 0, 1))
     info = MapMetaData(resolution=0.5, width=3, height=1, origin=origin)
     drawing = Drawing()
-    rows = read_cells(OccupancyGrid(info=info, data=[0, 100, -1]))
+    rows = read_cells([0, 100, -1], info.width, info.height, "map")
     assert draw_map(info, rows, IDENTITY, Look("/map"), drawing) == "3 x 1 cells of 0.5 m"
     (image,) = parts(drawing)
     assert image["cells"].tolist() == [0, 100, 255]
     assert image["palette"][[0, 100]].tolist() == [[255] * 4, [0, 0, 0, 255]]
     assert np.reshape(image["matrix"], (4, 4)).T[:2].tolist() == [[1.5, 0, 0, -1], [0, 0.5, 0, -2]]
     with pytest.raises(UsageError, match="2 cells; expected 3 x 1"):
-        read_cells(OccupancyGrid(info=info, data=[0, 0]))
+        read_cells([0, 0], info.width, info.height, "map")
 
 
 def test_updates_change_a_part_of_a_map(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     maps = robot.publisher("map", OccupancyGrid, latch=True)
     updates = robot.publisher("map_updates", OccupancyGridUpdate)
-    system = System(page, Permission())
+    system = System(page, PagePolicy())
     graph = system.graph.use().value
     eventually(lambda: graph.survey().view.publishers("/map"), "the map")
     frames = Frames(page)
@@ -181,15 +182,13 @@ def test_updates_change_a_part_of_a_map(network: Network) -> None:
     header = Header(frame_id="map")
     info = MapMetaData(resolution=1.0, width=3, height=2)
     maps.publish(OccupancyGrid(header=header, info=info, data=[0] * 6))
-    eventually(lambda: display.refresh("map"), "the map")
-    eventually(updates.subscribers, "the subscription to updates")
 
     def cells() -> list[int]:
         display.refresh("map")
-        (image,) = parts(display.encoded()[0])
-        found: list[int] = image["cells"].tolist()
-        return found
+        return [cell for image in parts(display.encoded()[0]) for cell in image["cells"].tolist()]
 
+    eventually(lambda: cells() == [0] * 6, "the map")
+    eventually(updates.subscribers, "the subscription to updates")
     updates.publish(OccupancyGridUpdate(header, 1, 0, 2, 2, [100, -1, 50, 1]))
     eventually(lambda: cells() == [0, 100, 255, 0, 50, 1], "the update")
     assert display.status == "3 x 2 cells of 1 m, 1 updates"
@@ -210,7 +209,7 @@ def test_a_grid_and_axes_are_at_a_frame(network: Network) -> None:
     page = network.node("page")
     StaticTransformBroadcaster(network.node("robot")).send(frame("map", "laser", 2.0, 1))
     frames = Frames(page)
-    eventually(lambda: "laser" in frames.names(), "the frame")
+    eventually(lambda: "laser" in frames.buffer.frames(), "the frame")
     axes = StillDisplay(Look("axes", frame="laser", size=2.0, radius=0.25), frames)
     assert axes.refresh("map")
     found = parts(axes.encoded()[0])
@@ -260,7 +259,7 @@ def frame(parent: str, child: str, x: float, stamp: int) -> TransformStamped:
 def test_a_display_waits_for_the_transform_and_names_it(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     publisher = robot.publisher("scan", LaserScan)
-    graph = System(page, Permission()).graph.use().value
+    graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/scan"), "the publisher")
     frames = Frames(page)
     display = TopicDisplay(page, graph.survey(), Look("/scan", "#ff0000"), frames)
@@ -309,8 +308,8 @@ def test_tools_publish_what_rviz_publishes(network: Network) -> None:
     for topic, kind in topics.items():
         robot.subscription(topic, kind, lambda message, topic=topic: got.update({topic: message}))
     with pytest.raises(UsageError, match="read-only: it may not publish '/initialpose'"):
-        Tools(page, Permission(read_only=True)).take("estimate")
-    tools = Tools(page, Permission())
+        Tools(page, PagePolicy(read_only=True)).take("estimate")
+    tools = Tools(page, PagePolicy())
     for name, tool in TOOLS.items():
         tools.send(name, "map", (1.0, 2.0, 0.5), math.pi / 2)
         eventually(lambda topic=tool.topic: topic in got, tool.topic)  # type: ignore[misc]

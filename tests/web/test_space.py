@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import base64
+import json
 import math
+import struct
+import time
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 import pytest
@@ -184,6 +188,87 @@ return found;
 """
     eventually(lambda: world.ask(size) == [1], "the texture of the box")
     assert world.messages() == []
+
+
+def test_meshes_reach_nothing_outside_packages(world: World) -> None:
+    """Whatever a mesh refers to: the browser asks the page's server alone, and neither of them
+    the server that stands for all others."""
+    asked: list[str] = []
+
+    class Elsewhere(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append(self.path)
+            self.send_error(404)
+
+    elsewhere = ThreadingHTTPServer(("127.0.0.1", 0), Elsewhere)
+    world.network.thread(elsewhere.serve_forever)
+    away = f"http://127.0.0.1:{elsewhere.server_port}"
+    secret = world.network.folder / "secret.stl"
+    secret.write_bytes(bytes(80) + struct.pack("<I12fH", 1, *range(12), 0))
+    package = world.network.folder / "painted"
+    tree: dict[str, Any] = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "scene": 0,
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}],
+        "images": [{"uri": f"{away}/image.png"}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36, "uri": f"{away}/buffer.bin"}],
+    }
+    text = json.dumps(tree).encode()
+    harmless = b'{"asset":{"version":"2.0"}}'
+    parts = [struct.pack("<I4s", len(part), b"JSON") + part for part in (harmless, text)]
+    size = 12 + sum(map(len, parts))
+    (package / "text.glb").write_bytes(text)
+    (package / "two.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, size) + b"".join(parts))
+    (package / "away.gltf").write_bytes(text)
+    (package / "away.obj").write_text(
+        f"mtllib {away}/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n"
+    )
+    (package / "away.dae").write_text(
+        f'<!DOCTYPE a [<!ENTITY e SYSTEM "{away}/entity">]><COLLADA version="1.4.1">'
+        f'<library_images><image id="i"><init_from>{away}/dae.png</init_from></image>'
+        "</library_images>&e;</COLLADA>"
+    )
+    meshes = [f"package://painted/{name}" for name in ("text.glb", "two.glb", "away.gltf")]
+    meshes += ["package://painted/away.obj", "package://painted/away.dae", f"{away}/a.stl"]
+    meshes += [f"{away}/a.glb", f"//{away[7:]}/a.stl", f"file://{secret}", "../secret.stl"]
+    meshes += ["package://painted/../secret.stl", "package://painted/%2e%2e/secret.stl"]
+    links = "".join(
+        f'<visual><geometry><mesh filename="{mesh}"/></geometry>'
+        f'<material name="m{n}"><texture filename="{away}/{n}.png"/></material></visual>'
+        for n, mesh in enumerate(meshes)
+    )
+    links += (
+        '<visual><geometry><box size="1 1 1"/></geometry><material name="t"><texture'
+        f' filename="{away}/texture.png"/></material></visual>'
+    )
+    robot = f'<robot name="p"><link name="map">{links}</link></robot>'
+    world.network.node("painter").params.set("/away", robot)
+    world.open("/3d?frame=map&show=robot:/away,grid")
+    world.should_see("1 links", "is in no package", "secret.stl")
+    fetched = """
+return performance.getEntriesByType('resource').map((one) => one.name)
+  .filter((name) => !name.startsWith(location.origin) && !name.startsWith('blob:')
+    && !name.startsWith('data:'));
+"""
+    eventually(lambda: drawn(world).get("lines", 0) > 0, "the grid")
+    assert world.ask(fetched) == []
+    assert asked == []
+    elsewhere.shutdown()
+    elsewhere.server_close()
+
+
+def test_a_page_shows_a_limited_number_of_displays(world: World) -> None:
+    began = time.monotonic()
+    world.open("/3d?show=" + ",".join(f"/topic_{number}" for number in range(500)))
+    world.should_see("'/topic_99' does not exist yet", "a page shows 100 displays")
+    assert "/topic_100" not in world.text
+    assert time.monotonic() - began < TIMEOUT
 
 
 def test_a_handle_is_turned_and_pressed(world: World) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import struct
@@ -55,6 +56,58 @@ def meshes(tmp_path: Path, sources: list[Any]) -> Meshes:
         return str(len(sources) - 1)
 
     return Meshes(Environment.read({"ROSZ_PACKAGE_PATH": str(tmp_path / "src")}), add)
+
+
+def chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack("<I4s", len(data), kind) + data
+
+
+def whole(*chunks: bytes, version: int = 2) -> bytes:
+    body = b"".join(chunks)
+    return struct.pack("<4sII", b"glTF", version, 12 + len(body)) + body
+
+
+_AWAY = b'{"asset":{"version":"2.0"},"buffers":[{"byteLength":9,"uri":"http://evil.example/b"}]}'
+_HERE = b'{"asset":{"version":"2.0"}}'
+_DEEP = b'{"asset":{"version":"2.0"},"extensions":{"X":[{"uri":"//evil.example/b"}]}}'
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        _AWAY,
+        whole(chunk(b"JSON", _AWAY)),
+        whole(chunk(b"JSON", _HERE), chunk(b"JSON", _AWAY)),
+        whole(chunk(b"BIN\0", b"x"), chunk(b"JSON", _AWAY)),
+        whole(chunk(b"JSON", _DEEP)),
+        whole(chunk(b"JSON", _HERE)) + chunk(b"JSON", _AWAY),
+        whole(chunk(b"JSON", _AWAY), version=1),
+        whole(chunk(b"JSON", b"[" * 100_000)),
+    ],
+    ids=["text", "plain", "second", "late", "extension", "behind", "old", "deep"],
+)
+def test_no_mesh_leads_a_browser_elsewhere(
+    meshes: Meshes, tmp_path: Path, sources: list[Any], data: bytes
+) -> None:
+    (tmp_path / "src" / "robot" / "away.glb").write_bytes(data)
+    with contextlib.suppress(UsageError):  # it is not a mesh that can be read
+        meshes.find("package://robot/away.glb")
+    assert not any(b"evil" in source()[0] for source in sources)
+
+
+def test_a_mesh_of_one_file_is_sent_as_it_is(
+    meshes: Meshes, tmp_path: Path, sources: list[Any]
+) -> None:
+    data = whole(chunk(b"JSON", _HERE), chunk(b"BIN\0", bytes(8)))
+    (tmp_path / "src" / "robot" / "own.glb").write_bytes(data)
+    meshes.find("package://robot/own.glb")
+    assert sources[-1]()[0] == data
+
+
+@pytest.mark.parametrize("uri", ["package://[/a.stl", "http://[", "file://[/x.stl"])
+def test_malformed_addresses_of_meshes(meshes: Meshes, uri: str) -> None:
+    with pytest.raises(UsageError):
+        meshes.find(uri)
 
 
 def glb(image: str) -> bytes:
@@ -161,7 +214,7 @@ def test_a_texture_that_cannot_be_shown_is_named(meshes: Meshes) -> None:
 
 
 def test_bytes_that_only_seem_to_be_a_picture_are_refused() -> None:
-    from rosz.web.scene.textures import read_texture
+    from rosz.web.scene.meshes import read_texture
 
     buffer = io.BytesIO()
     Image.new("RGB", (64, 64)).save(buffer, "PNG")

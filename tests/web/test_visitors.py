@@ -25,9 +25,9 @@ LONG = 4 * TIMEOUT
 SERVER = """
 import sys
 from rosz.node import Node
-from rosz.web import Settings, open_page
+from rosz.web import PageSettings, open_page
 with Node("web") as node:
-    server, (address, *_) = open_page(node, Settings(port=0, most_pages=int(sys.argv[1])))
+    server, (address, *_) = open_page(node, PageSettings(port=0, most_pages=int(sys.argv[1])))
     print("the page is at", address, flush=True)
     print("aiohttp is loaded:", "aiohttp" in sys.modules, flush=True)
     sys.stdin.readline()

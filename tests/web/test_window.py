@@ -14,7 +14,7 @@ from rosz.environment import Environment, package_index
 from rosz.errors import UsageError
 from rosz.names import resolve
 from rosz.web.rviz_file import read_rviz
-from rosz.web.scene import Look, Setup
+from rosz.web.scene import Look, SceneSetup
 from rosz.web.window import WINDOWS, page_of
 
 LONG = 4 * TIMEOUT
@@ -141,7 +141,7 @@ def test_a_file_of_rviz_is_a_setup(tmp_path: Path) -> None:
     file = tmp_path / "robot.rviz"
     file.write_text(RVIZ)
     setup, left_out = read_rviz(file, plain)
-    assert setup == Setup(
+    assert setup == SceneSetup(
         "odom",
         (
             Look("grid", size=0.5),

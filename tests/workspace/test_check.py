@@ -177,7 +177,7 @@ def test_what_is_well(workspace: Path, name: str, text: str) -> None:
 
 
 def test_a_cfg_is_run(workspace: Path) -> None:
-    pytest.importorskip("rosz.ros1.dynamic_reconfigure")
+    pytest.importorskip("rosz.ros1.client.dynamic_reconfigure")
     head = (
         "#!/usr/bin/env python3\n"
         "from dynamic_reconfigure.parameter_generator_catkin import *\n"

@@ -1,8 +1,8 @@
-"""The tokens of two sides, and what passes between them because of them.
+"""The crossing between two sides: tokens for the entities of each side, and relays.
 
-Each entity on the one side gets a token on the other, under its name there. A topic passes when
-the other side has a subscription, and a call when this side has a server. All declarations come
-and go on one thread.
+Each entity on one side gets a token on the other side, with its name there. Samples pass to a side
+that has a subscription, and calls pass to a side that has a server. One thread makes and removes
+all declarations.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ import msgspec
 
 from rosz.bridges.fleet.plan import FleetPlan
 from rosz.bridges.fleet.relays import (
-    Calls,
     Edit,
     Ids,
     QueryRelay,
     TopicRelay,
+    call_worker,
     log,
-    prefix_frames,
-    strip_frames,
+    rename_frames,
 )
 from rosz.errors import ClosedError
 from rosz.graph import Graph
@@ -32,24 +31,21 @@ from rosz.session import Session
 from rosz.wire import Kind, Token, entity_key, format_token, gid
 from rosz.worker import Worker
 
-__all__ = ("Crossing", "Side", "foreign_id", "mark_of")
-
 _OFFERS: Final = (Kind.PUBLISHER, Kind.SERVICE)
 _SESSIONS: Final = 10_000
 _TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
 
 
 def mark_of(prefix: str) -> str:
-    """Return what the ids of sessions begin with in all tokens of the crossing of a prefix."""
+    """Return the text with which all session ids of the crossing of a prefix begin."""
     return f"1{_digits(prefix, 9)}"
 
 
 def foreign_id(prefix: str, zid: str) -> str:
-    """Return the id of a session as the other side sees it, the same after each restart.
+    """Return the id of a session on the other side; it stays the same after a restart.
 
-    It is not one of rosz. So others address what crosses as that of a node of ROS 2, by its topics
-    and services alone. It has none of the digits by which nodes of rosz recognise those of ROS 2,
-    which want more services.
+    It is not an id of rosz, so others use only topics and services, as for a node of ROS 2. It also
+    lacks the digits by which nodes of rosz recognise nodes of ROS 2, which need more services.
     """
     return mark_of(prefix) + _digits(zid, 20)
 
@@ -60,16 +56,7 @@ def _digits(text: str, count: int) -> str:
 
 
 class Side:
-    """One of the two sides of a crossing.
-
-    Args:
-        session: The session.
-        domain: The ROS domain.
-
-    Attributes:
-        session: The session.
-        graph: The entities there.
-    """
+    """One of the two sides of a crossing."""
 
     def __init__(self, session: Session, domain: int) -> None:
         self.session = session
@@ -77,13 +64,10 @@ class Side:
 
 
 class _Direction:
-    """One direction of a crossing: declares the tokens of one side on the other side.
+    """One direction of a crossing, which declares entities of the source on the target.
 
     Args:
-        source: The side where it exists.
-        target: The other side.
-        plan: The names that cross.
-        outward: Whether the other side is beyond the machine.
+        outward: Whether the target is outside the machine.
     """
 
     def __init__(self, source: Side, target: Side, plan: FleetPlan, *, outward: bool) -> None:
@@ -98,15 +82,15 @@ class _Direction:
         self.relays: dict[tuple[Kind, str, bool], list[Closable]] = {}
 
     def mirrored(self, token: Token) -> Token | None:
-        """Return a token as it is on the other side; ``None`` if it does not cross."""
+        """Return the token for the target; ``None`` if the entity does not cross."""
         name = token.name
         if token.kind is Kind.NODE:
             if not (self._outward and self._plan.shares_all):
-                return None  # its entities make a node known, too
-        elif (found := self._name(token.kind, name)) is None:
+                return None  # the tokens of its entities make a node known
+        elif (renamed := self._name(token.kind, name)) is None:
             return None
         else:
-            name = found
+            name = renamed
         namespace, _, base = self._node(token.node_name).rpartition("/")
         zid = self._there(token.zid)
         return msgspec.structs.replace(
@@ -114,15 +98,16 @@ class _Direction:
         )
 
     def _there(self, zid: str) -> str:
-        found = foreign_id(self._plan.prefix, zid)
-        self._zids[found] = zid
+        foreign = foreign_id(self._plan.prefix, zid)
+        self._zids[foreign] = zid
         while len(self._zids) > _SESSIONS:
             del self._zids[next(iter(self._zids))]
-        return found
+        return foreign
 
     def _name(self, kind: Kind, name: str) -> str | None:
         inside = name if self._outward else self._plan.inside(name)
-        # Offers on the machine leave it, and so do interests from beyond it.
+        # Data leaves the machine from its publishers and servers, and for subscriptions and clients
+        # outside.
         leaves = (kind in _OFFERS) is self._outward
         if inside is None:
             return None
@@ -137,45 +122,44 @@ class _Direction:
         return name.removeprefix(prefix) if name.startswith(f"{prefix}/") else name
 
     def edit(self, type_name: str) -> Edit:
-        """Return what changes in the samples of a type that pass in this direction."""
+        """Return the changes to samples of a type that pass in this direction."""
         if not (self._plan.frames and type_name == _TRANSFORMS):
             return Edit(self.ids)
-        change = prefix_frames if self._outward else strip_frames
-        return Edit(self.ids, partial(change, self._plan.prefix.strip("/")))
+        head = f"{self._plan.prefix.strip('/')}/"
+
+        def rename(frame: str) -> str:
+            return f"{head}{frame.lstrip('/')}" if self._outward else frame.removeprefix(head)
+
+        return Edit(self.ids, partial(rename_frames, rename))
 
     def rate(self, name: str) -> float:
-        """Return the most samples per second of a topic, by its name in the source."""
+        """Return the largest number of samples per second of a topic; the name is the source's."""
         return self._plan.rate(name) if self._outward else float("inf")
 
     def source_ids(self, key: str) -> str:
-        """Return a key with the ids of sessions in the source, for one with those in the target."""
+        """Return a key of the target with the session ids replaced by those of the source."""
         return "/".join(self._zids.get(chunk, chunk) for chunk in key.split("/"))
 
     def detection(self, key: str) -> str | None:
-        """Return the end of the token of a latching publisher as it is in the target.
+        """Return the end of the key of a latching publisher's token in the target.
 
         Args:
             key: The end in the source, ``/@adv/pub/<zid>/<entity>/_``.
 
         Returns:
-            The end; ``None`` if the crossing itself has declared that token.
+            The end in the target; ``None`` if the crossing itself has declared the token.
         """
         zid, _, rest = key.removeprefix("/@adv/pub/").partition("/")
         return None if zid.startswith(self.mark) else f"/@adv/pub/{self._there(zid)}/{rest}"
 
 
 class Crossing:
-    """Passes tokens, samples and calls between a machine and other machines, until closed.
-
-    Args:
-        plan: The names that cross.
-        inside: The machine.
-        outside: All others.
-    """
+    """Passes tokens, samples and calls between a machine and other machines, until closed."""
 
     def __init__(self, plan: FleetPlan, inside: Side, outside: Side) -> None:
         self._lifecycle = Lifecycle(f"the crossing of '{plan.prefix}'", log=log)
-        self._calls = self._lifecycle.keep(Calls())
+        self._calls = call_worker()
+        self._lifecycle.keep(Registration(partial(self._calls.close, 0)))
         outward = _Direction(inside, outside, plan, outward=True)
         inward = _Direction(outside, inside, plan, outward=False)
         self._directions = (outward, inward)
@@ -186,7 +170,7 @@ class Crossing:
             self._lifecycle.keep(Registration(stop))
 
     def close(self) -> None:
-        """End it; a second call has no effect."""
+        """Close the crossing; a second call has no effect."""
         self._lifecycle.close()
         self._changes.submit(self._undeclare)
         self._changes.close()
@@ -217,7 +201,7 @@ class Crossing:
             else:
                 self._remove(direction, key, token)
         except ClosedError:
-            return  # a session ends
+            return  # a session is being closed
 
     def _add(self, direction: _Direction, key: str, token: Token, mirrored: Token) -> None:
         if key in direction.tokens:
@@ -230,7 +214,7 @@ class Crossing:
                 direction.relays[place] = self._relays(direction, token, mirrored)
         direction.tokens[key] = direction.target.session.token(there)
         if token.kind is Kind.PUBLISHER:
-            # Samples wait for this, so whoever gets one can look its publisher up.
+            # Samples wait for this, so that a receiver can find the publisher of a sample.
             direction.ids.add(gid(key), gid(there))
 
     def _remove(self, direction: _Direction, key: str, token: Token) -> None:
@@ -247,7 +231,7 @@ class Crossing:
                 relay.close()
 
     def _relays(self, direction: _Direction, token: Token, mirrored: Token) -> list[Closable]:
-        """Return what has to pass because of an entity, before others hear of it."""
+        """Return the relays for an entity; they exist before others can see its token."""
         here, there = direction.source.session, direction.target.session
         key, other = _key(token), _key(mirrored)
         assert token.qos is not None  # noqa: S101  # only entities have relays
@@ -265,7 +249,7 @@ class Crossing:
         return []
 
     def _history(self, direction: _Direction, key: str, other: str, edit: Edit) -> list[Closable]:
-        """Return what replies to those who ask latching publishers for what they sent before."""
+        """Return what passes queries for earlier samples of latching publishers."""
 
         def there(asked: str) -> str:
             return direction.source_ids(key + asked.removeprefix(other))
@@ -284,13 +268,7 @@ class Crossing:
 
 
 class _Detection:
-    """Makes known the tokens by which latching publishers are detected.
-
-    Args:
-        direction: The direction of the publishers.
-        key: The key of the topic in the source.
-        other: The key of the topic in the target.
-    """
+    """Declares on the target the tokens by which subscribers detect latching publishers."""
 
     def __init__(self, direction: _Direction, key: str, other: str) -> None:
         self._direction, self._key, self._other = direction, key, other
@@ -301,23 +279,23 @@ class _Detection:
     def _changed(self, token: str, alive: bool) -> None:
         direction = self._direction
         if not alive:
-            known = self._own.pop(token, None)
-            if known is not None:
-                known.close()
+            own = self._own.pop(token, None)
+            if own is not None:
+                own.close()
             return
         end = direction.detection(token.removeprefix(self._key))
         if end is not None and token not in self._own:
             self._own[token] = direction.target.session.token(self._other + end)
 
     def close(self) -> None:
-        """Take them back; a second call has no effect."""
+        """Remove the tokens; a second call has no effect."""
         self._watch.close()
         while self._own:
             self._own.popitem()[1].close()
 
 
 def _place(token: Token) -> tuple[Kind, str, bool]:
-    """Return what entities that need the same relays have in common."""
+    """Return the key by which entities share their relays."""
     return token.kind, _key(token), token.qos is not None and token.qos.latched
 
 

@@ -1,4 +1,4 @@
-"""A robot of a fleet: a second session, beyond the machine, and what crosses to it."""
+"""A robot of a fleet: a second session, beyond the machine, and the crossing to it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 import socket
 import time
 from collections.abc import Callable, Sequence
-from typing import Final, Self
+from typing import Final
 
 from rosz.bridges.fleet.crossing import Crossing, Side, foreign_id
 from rosz.bridges.fleet.parameters import ParameterCrossing
@@ -14,14 +14,11 @@ from rosz.bridges.fleet.plan import FleetPlan
 from rosz.bridges.fleet.relays import log
 from rosz.environment import Environment
 from rosz.errors import TransportError
-from rosz.lifecycle import Lifecycle, Registration
+from rosz.lifecycle import Closing, Lifecycle, Registration
 from rosz.params.replica import Replica
-from rosz.session import Session
-from rosz.session.router import Beyond
+from rosz.session import ExternalRouter, Session
 from rosz.wire import Kind, Token, format_token, nodes_key, parse_token
 from rosz.worker import Worker
-
-__all__ = ("Fleet",)
 
 _CORE: Final = "core_"
 _ENCLAVE: Final = "/rosz_core"
@@ -32,7 +29,7 @@ _LEFT_SECONDS: Final = 12.0
 _POLL_SECONDS: Final = 0.5
 
 
-class Fleet:
+class Fleet(Closing):
     """Connects the network of this machine with other machines, until closed.
 
     The session beyond the machine dials and listens there; that of the machine does neither. If
@@ -48,7 +45,7 @@ class Fleet:
         connect: Endpoints to connect to, beyond the machine.
 
     Attributes:
-        beyond: The session beyond the machine, and what it dials.
+        beyond: The session beyond the machine, with the endpoints that it dials.
 
     Raises:
         TransportError: Another robot has the prefix, or an endpoint is occupied or malformed.
@@ -71,7 +68,9 @@ class Fleet:
         self._crossing: Lifecycle | None = None
         self._changes: Worker[Callable[[], object]] = Worker("rosz-fleet-claim", logger=log)
         try:
-            self.beyond: Beyond = self._lifecycle.keep(Beyond(environment, listen, connect))
+            self.beyond: ExternalRouter = self._lifecycle.keep(
+                ExternalRouter(environment, listen, connect)
+            )
             outside = self.beyond.session
             self.beyond.announce()
             now = time.time_ns() // 1_000_000
@@ -100,18 +99,8 @@ class Fleet:
         self._lifecycle.close()
         self._changes.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _wait_for_name(self, outside: Session) -> None:
-        """Wait until what is left of an earlier core of this machine has gone.
-
-        Raises:
-            TransportError: Another machine has the prefix.
-        """
+        """Wait until the tokens of an earlier core of this machine have gone."""
         deadline = time.monotonic() + _LEFT_SECONDS
         while True:
             tokens = outside.live_tokens(nodes_key(self._claim.domain), _TOKENS_SECONDS)
@@ -138,9 +127,9 @@ class Fleet:
         self._changes.submit(self._decide)
 
     def _decide(self) -> None:
-        """Begin or end what crosses; on the thread for changes."""
+        """Begin or end the crossing; on the thread for changes."""
         own = self._claim.node_id, self._claim.zid
-        older = [one for one in self._others.values() if (one.node_id, one.zid) < own]
+        older = [claim for claim in self._others.values() if (claim.node_id, claim.zid) < own]
         if self._lifecycle.closing:
             return
         if older and self._crossing is not None:

@@ -1,6 +1,6 @@
 """The parameters of a robot, which have the prefix of the robot beyond its machine.
 
-Each side has a replica, and what is written to the one is written to the other with its time. So
+Each side has a replica, and a write to the one is written to the other with its time. So
 of two writes to one parameter the later one stays on both sides, whichever passes first.
 """
 
@@ -17,8 +17,6 @@ from rosz.params import DELETED, MISSING, Change, Path, Value, condense, joined,
 from rosz.params.replica import Changed, Replica
 from rosz.session import Stamp
 
-__all__ = ("ParameterCrossing",)
-
 _ORIGIN = "the crossing of"
 
 
@@ -26,11 +24,6 @@ class ParameterCrossing:
     """Keeps the parameters of two replicas the same, until closed.
 
     At the start, a parameter that both have keeps the value that it has on the machine.
-
-    Args:
-        plan: The names that cross.
-        inside: The replica of the machine.
-        outside: The replica of all others.
     """
 
     def __init__(self, plan: FleetPlan, inside: Replica, outside: Replica) -> None:
@@ -39,8 +32,8 @@ class ParameterCrossing:
         self._lifecycle = Lifecycle(f"the parameters of '{plan.prefix}'", log=log)
         ways = ((inside, outside, self._outside), (outside, inside, self._inside))
         for source, target, rename in ways:
-            known = partial(self._pass, source, target, rename)
-            self._lifecycle.keep(source.watch("/", known))
+            pass_on = partial(self._pass, source, target, rename)
+            self._lifecycle.keep(source.watch("/", pass_on))
         self._pass_all(inside, outside, self._outside, replace=True)
         self._pass_all(outside, inside, self._inside, replace=False)
 
@@ -50,8 +43,8 @@ class ParameterCrossing:
 
     def _outside(self, path: Path) -> Path | None:
         name = joined(path)
-        found = self._plan.outside(name) if self._plan.shares(name) else None
-        return None if found is None else split(found)
+        outside = self._plan.outside(name) if self._plan.shares(name) else None
+        return None if outside is None else split(outside)
 
     def _inside(self, path: Path) -> Path | None:
         name = self._plan.inside(joined(path))
@@ -70,8 +63,8 @@ class ParameterCrossing:
             there = rename(path) if path else None
             if there is None:
                 continue
-            known = target.lookup(there)
-            if known is MISSING or (replace and known != value):
+            present = target.lookup(there)
+            if present is MISSING or (replace and present != value):
                 changes.append((there, value))
         self._write(target, changes, None)
 
@@ -96,7 +89,7 @@ class ParameterCrossing:
                 changes.append((there, new[path]))
             elif target.lookup(there) is not MISSING:
                 changes.append((there, DELETED))
-        # A leaf that became a dict is deleted before what is below it is set.
+        # A leaf that became a dict is deleted before the values below it are set.
         changes.sort(key=lambda change: (change[1] is not DELETED, len(change[0])))
         self._write(target, changes, Stamp(changed.time, source.zid))
 

@@ -3,9 +3,9 @@
 ::
 
     as: /robot1
-    share: [/odom, /scan, "/camera/**@2Hz"]      # what leaves; all of it if not given
-    take: [/cmd_vel]                             # what comes in; all of it if not given
-    common: [/map]                               # what has the same name on both sides
+    share: [/odom, /scan, "/camera/**@2Hz"]      # names that leave; all if not given
+    take: [/cmd_vel]                             # names that come in; all if not given
+    common: [/map]                               # names that are the same on both sides
     frames: true                                 # put the prefix before the frames of tf, too
 
 Beyond the machine, ``/odom`` is ``/robot1/odom``. Patterns are names on the robot, as in rules:
@@ -25,16 +25,14 @@ import yaml
 
 from rosz import names
 from rosz.errors import InvalidName, UsageError, near_miss
-from rosz.security.reading import NodeReader, compose, is_pattern, matches
-
-__all__ = ("FleetPlan", "Shared", "check_prefix", "read_plan", "read_share")
+from rosz.security import PatternReader, compose, is_pattern, matches
 
 _KEYS: Final = ("as", "share", "take", "common", "frames")
 _RATE: Final = re.compile(r"(?P<pattern>.*)@(?P<rate>[0-9]*\.?[0-9]+) ?Hz", re.DOTALL)
 _ACTION: Final = "/_action/"
 
 
-class Shared(msgspec.Struct, frozen=True):
+class SharedNames(msgspec.Struct, frozen=True):
     """A pattern of names that leave a robot.
 
     Attributes:
@@ -46,30 +44,30 @@ class Shared(msgspec.Struct, frozen=True):
     rate: float = math.inf
 
 
-_ALL: Final = Shared("/**")
+_ALL: Final = SharedNames("/**")
 
 
 class FleetPlan(msgspec.Struct, frozen=True, kw_only=True):
-    """The names that a robot shares with other machines, and what they are called there.
+    """The names that a robot shares with other machines, and their form there.
 
     Attributes:
         prefix: The namespace of the robot beyond its machine, such as ``/robot1``.
-        share: What leaves: topics published, services and actions served, parameters.
-        take: Patterns of what comes in: topics subscribed to, services and actions called.
+        share: Names that leave: topics published, services and actions served, parameters.
+        take: Patterns of names that come in: topics subscribed to, services and actions called.
         common: Patterns of the names that are the same on both sides.
         frames: Whether the frames of tf get the prefix.
     """
 
     prefix: str = ""
-    share: tuple[Shared, ...] = (_ALL,)
+    share: tuple[SharedNames, ...] = (_ALL,)
     take: tuple[str, ...] = ("/**",)
     common: tuple[str, ...] = ()
     frames: bool = False
 
     def outside(self, name: str) -> str | None:
         """Return the name beyond the machine of a name on it; ``None`` if it has none."""
-        found = name if self._is_common(name) else f"{self.prefix}{name}"
-        return found if self.inside(found) == name else None
+        beyond = name if self._is_common(name) else f"{self.prefix}{name}"
+        return beyond if self.inside(beyond) == name else None
 
     def inside(self, name: str) -> str | None:
         """Return the name on the machine of a name beyond it; ``None`` if it has none."""
@@ -78,22 +76,22 @@ class FleetPlan(msgspec.Struct, frozen=True, kw_only=True):
         return name[len(self.prefix) :] if name.startswith(f"{self.prefix}/") else None
 
     def shares(self, name: str) -> bool:
-        """Tell whether what has a name on the machine may leave it."""
-        return _any_matches(tuple(one.pattern for one in self.share), name)
+        """Tell whether a name on the machine may leave it."""
+        return _any_matches(tuple(shared.pattern for shared in self.share), name)
 
     def takes(self, name: str) -> bool:
-        """Tell whether what has a name on the machine may come in."""
+        """Tell whether a name on the machine may come in."""
         return _any_matches(self.take, name)
 
     @property
     def shares_all(self) -> bool:
         """Whether everything leaves."""
-        return any(one.pattern == _ALL.pattern for one in self.share)
+        return any(shared.pattern == _ALL.pattern for shared in self.share)
 
     def rate(self, name: str) -> float:
         """Return the most samples per second of a name; the greatest of all that match it."""
-        found = [one.rate for one in self.share if _any_matches((one.pattern,), name)]
-        return max(found, default=math.inf)
+        rates = [shared.rate for shared in self.share if _any_matches((shared.pattern,), name)]
+        return max(rates, default=math.inf)
 
     def _is_common(self, name: str) -> bool:
         return _any_matches(self.common, name)
@@ -103,22 +101,22 @@ class FleetPlan(msgspec.Struct, frozen=True, kw_only=True):
 def _any_matches(patterns: tuple[str, ...], name: str) -> bool:
     """Tell whether a pattern matches a name, or the action that the name is a part of."""
     action, _, _ = name.partition(_ACTION)
-    return any(matches(pattern, one) for pattern in patterns for one in {name, action})
+    return any(matches(pattern, candidate) for pattern in patterns for candidate in {name, action})
 
 
-def read_share(text: str) -> tuple[Shared, ...]:
-    """Return what ``--share`` asks for, such as ``/odom,/camera/**@2Hz``.
+def read_share(text: str) -> tuple[SharedNames, ...]:
+    """Return the patterns of ``--share``, such as ``/odom,/camera/**@2Hz``.
 
     Raises:
         UsageError: A part is not a pattern, or its rate is not a number above 0.
     """
-    found = []
+    patterns = []
     for part in map(str.strip, text.split(",")):
         shared = _shared(part)
         if shared is None:
             raise UsageError(f"--share has '{part}'; expected such as /odom or /camera/**@2Hz")
-        found.append(shared)
-    return tuple(found)
+        patterns.append(shared)
+    return tuple(patterns)
 
 
 def check_prefix(prefix: str, what: str) -> str:
@@ -147,16 +145,16 @@ def read_plan(text: str, file: str) -> FleetPlan:
         YamlError: The text is not YAML, or says something else.
     """
     top = compose(text, file)
-    return FleetPlan() if top is None else _Reader(file).plan(top)
+    return FleetPlan() if top is None else _PlanReader(file).plan(top)
 
 
-def _shared(text: str) -> Shared | None:
-    found = _RATE.fullmatch(text)
-    pattern, rate = (found["pattern"], float(found["rate"])) if found else (text, math.inf)
-    return Shared(pattern, rate) if is_pattern(pattern) and rate > 0 else None
+def _shared(text: str) -> SharedNames | None:
+    match = _RATE.fullmatch(text)
+    pattern, rate = (match["pattern"], float(match["rate"])) if match else (text, math.inf)
+    return SharedNames(pattern, rate) if is_pattern(pattern) and rate > 0 else None
 
 
-class _Reader(NodeReader):
+class _PlanReader(PatternReader):
     """Converts the nodes of a YAML document; its errors say where the mistake is."""
 
     def plan(self, node: yaml.Node) -> FleetPlan:
@@ -184,7 +182,7 @@ class _Reader(NodeReader):
         except UsageError as error:
             raise self.error(node, str(error)) from error
 
-    def _share(self, node: yaml.Node, text: str) -> Shared:
+    def _share(self, node: yaml.Node, text: str) -> SharedNames:
         shared = _shared(text)
         if shared is None:
             raise self.error(

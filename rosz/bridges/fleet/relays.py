@@ -1,8 +1,8 @@
-"""Passing samples, queries and replies from one session to another, without decoding them.
+"""Relays, which pass samples, queries and replies between sessions without decoding them.
 
-A relay receives what other sessions send, never what its own sends, so nothing passes twice. Each
-relay of a topic has a thread and a ring of the newest samples: a slow link to the one side delays
-this thread alone, and the ring is what waits for it.
+A relay receives only what other sessions send, not what its own session sends, so nothing passes
+twice. Each topic relay has a thread and a ring buffer of the newest samples. A slow link delays
+only this thread, while samples wait in the buffer.
 """
 
 from __future__ import annotations
@@ -22,59 +22,44 @@ from rosz.session import LONGEST_WAIT, Cancellation, Query, Sample, Session
 from rosz.wire import pack_attachment, read_attachment
 from rosz.worker import Worker
 
-__all__ = ("Calls", "Edit", "Ids", "QueryRelay", "TopicRelay", "prefix_frames", "strip_frames")
-
 log = logging.getLogger("rosz.fleet")
 
 _DEPTH: Final = 10
 _DEEPEST: Final = 1000
+"""Smallest and largest size of the ring buffer of a topic, in samples."""
 _CALLS: Final = 256
 _WAITING: Final = 1000
+"""Largest numbers of calls that are handled at once, and that wait."""
 _CALL_SECONDS: Final = 600.0
-"""The time limit of rmw_zenoh's clients."""
+"""Time limit of a call; that of rmw_zenoh's clients."""
 _GID_AT: Final = 17
 _SIZE: Final = 33
-"""The sizes of an attachment, without its id of a publisher and with it."""
+"""The size of an attachment, without and with the id of the publisher at its end."""
 _TOKEN_SECONDS: Final = 2.0
-"""Seconds for which the first sample of a publisher waits for its token."""
+"""Seconds that the first sample of a publisher waits for the token of the publisher."""
 _PUBLISHERS: Final = 1000
-"""Largest number of publishers in each memory: of those that have gone, and of the unknown."""
+"""Largest number of publishers that are remembered after their end, and of unknown ones."""
 _RESULT: Final = "/_action/get_result"
 
 
-def prefix_frames(prefix: str, payload: bytes) -> bytes:
-    """Return transforms with a prefix before each frame.
+def rename_frames(rename: Callable[[str], str], payload: bytes) -> bytes:
+    """Return encoded transforms with renamed frames.
 
     Raises:
         DecodeError: The bytes do not encode transforms.
     """
     message = TFMessage._decode(payload)
     for transform in message.transforms:
-        header = transform.header
-        header.frame_id = f"{prefix}/{header.frame_id.lstrip('/')}"
-        transform.child_frame_id = f"{prefix}/{transform.child_frame_id.lstrip('/')}"
-    return bytes(TFMessage._encode(message))
-
-
-def strip_frames(prefix: str, payload: bytes) -> bytes:
-    """Return transforms whose frames have lost a prefix; others stay as they are.
-
-    Raises:
-        DecodeError: The bytes do not encode transforms.
-    """
-    start = f"{prefix}/"
-    message = TFMessage._decode(payload)
-    for transform in message.transforms:
-        transform.header.frame_id = transform.header.frame_id.removeprefix(start)
-        transform.child_frame_id = transform.child_frame_id.removeprefix(start)
+        transform.header.frame_id = rename(transform.header.frame_id)
+        transform.child_frame_id = rename(transform.child_frame_id)
     return bytes(TFMessage._encode(message))
 
 
 class Ids:
-    """The ids of publishers on the other side, by their ids on this one.
+    """The ids of publishers on the other side, by their ids on this side.
 
-    Samples and tokens come on different threads. So a sample may be here before the token of its
-    publisher, and may still wait here after that token has gone.
+    Samples and tokens arrive on different threads. So a sample may arrive before the token of its
+    publisher, and may still wait here after the end of that token.
     """
 
     def __init__(self) -> None:
@@ -84,14 +69,14 @@ class Ids:
         self._awaited: dict[bytes, float] = {}
 
     def add(self, gid: bytes, there: bytes) -> None:
-        """Note the id on the other side of a publisher that others can see there."""
+        """Store the id of a publisher on the other side, where it is declared now."""
         with self._added:
             self._known[gid] = there
             self._gone.pop(gid, None)
             self._added.notify_all()
 
     def remove(self, gid: bytes) -> None:
-        """Note that a publisher has gone; the ids of the last of them stay known."""
+        """Remove a publisher; the ids of the most recently removed ones can still be found."""
         with self._added:
             there = self._known.pop(gid, None)
             if there is not None:
@@ -103,9 +88,9 @@ class Ids:
 
         An unknown publisher gets 2 seconds to become known, but only once.
         """
-        found = self._known.get(gid)
-        if found is not None:
-            return found
+        there = self._known.get(gid)
+        if there is not None:
+            return there
         with self._added:
             deadline = self._awaited.setdefault(gid, time.monotonic() + _TOKEN_SECONDS)
             _shorten(self._awaited)
@@ -114,9 +99,9 @@ class Ids:
             return self._known.get(gid) or self._gone.get(gid)
 
 
-def _shorten(found: dict[bytes, Any]) -> None:
-    while len(found) > _PUBLISHERS:
-        del found[next(iter(found))]
+def _shorten(memory: dict[bytes, Any]) -> None:
+    while len(memory) > _PUBLISHERS:
+        del memory[next(iter(memory))]
 
 
 class Edit:
@@ -124,7 +109,7 @@ class Edit:
 
     Args:
         ids: The ids of publishers on the other side.
-        payload: Function that returns the payload to send; samples pass as they are without it.
+        payload: Function that returns the payload to send; payloads are unchanged when not given.
     """
 
     def __init__(self, ids: Ids, payload: Callable[[bytes], bytes] | None = None) -> None:
@@ -132,7 +117,7 @@ class Edit:
         self._payload = payload
 
     def attachment(self, sample: Sample) -> bytes | None:
-        """Return the bytes to send beside the payload: a publisher has another id there."""
+        """Return the attachment to send, with the publisher's id on the other side."""
         data = sample.attachment
         if data is None:
             return None
@@ -140,7 +125,7 @@ class Edit:
         return data if gid is None else data[:_GID_AT] + gid
 
     def payload(self, sample: Sample) -> bytes | None:
-        """Return the payload to send; ``None`` if it is that of the sample.
+        """Return the payload to send; ``None`` if it is unchanged.
 
         Raises:
             DecodeError: The sample is damaged.
@@ -149,16 +134,11 @@ class Edit:
 
 
 class TopicRelay:
-    """Passes the samples of one topic on, until closed.
+    """Passes the samples of one topic from one session to another, until closed.
 
     Args:
-        source: The session to receive on.
-        source_key: The key of the topic there.
-        target: The session to publish on.
-        target_key: The key of the topic there.
-        qos: The QoS of the subscription that asks for the samples.
+        qos: The QoS of the subscription for which the samples pass.
         rate: Largest number of samples per second of each publisher; infinity for no limit.
-        edit: What changes in the samples.
     """
 
     def __init__(
@@ -178,7 +158,7 @@ class TopicRelay:
         self._sent: dict[bytes, int] = {}
         self._key = source_key
         self._damaged = False
-        # A reliable sample waits for the link, on the thread of this relay alone.
+        # A reliable sample blocks until the link takes it, but only on the thread of this relay.
         self._publisher = target.publisher(target_key, reliable=qos.reliable, block=qos.reliable)
         depth = _DEEPEST if qos.history == "keep_all" else min(max(qos.depth, _DEPTH), _DEEPEST)
         self._subscriber = source.pull_subscriber(source_key, depth, remote_only=True)
@@ -201,10 +181,13 @@ class TopicRelay:
         except DecodeError as error:
             if not self._damaged:
                 self._damaged = True
-                log.warning("what comes on '%s' does not pass (told once): %s", self._key, error)
+                log.warning("dropping damaged samples on '%s' (told once): %s", self._key, error)
 
     def _limit(self, attachment: bytes | None) -> bytes | None:
-        """Return the attachment of a sample that is due, with a number that leaves no gap."""
+        """Return the attachment of a sample that is due, renumbered without gaps; else None.
+
+        An attachment that cannot be read is returned unchanged.
+        """
         try:
             sequence, published, gid = read_attachment(attachment)
         except DecodeError:
@@ -212,7 +195,7 @@ class TopicRelay:
         now, due = time.monotonic(), self._due.get(gid, 0.0)
         if now < due:
             return None
-        # A sample that is late by less than a period does not delay those after it.
+        # A sample that is late by less than a period does not delay the samples after it.
         self._due[gid] = (due if now - due < self._period else now) + self._period
         self._sent[gid] = number = self._sent.get(gid, sequence - 1) + 1
         while len(self._due) > _DEEPEST:
@@ -221,41 +204,23 @@ class TopicRelay:
         return pack_attachment(number, published, gid)
 
     def close(self) -> None:
-        """Pass nothing more; a second call has no effect."""
+        """Stop passing samples; a second call has no effect."""
         self._subscriber.close()
         self._publisher.close()
 
 
-class Calls:
-    """The threads on which queries wait for their replies; a limited number of them."""
-
-    def __init__(self) -> None:
-        self._worker: Worker[Callable[[], object]] = Worker(
-            "rosz-fleet-call", threads=_CALLS, capacity=_WAITING, logger=log
-        )
-
-    def add(self, query: Query, handle: Callable[[Query], object]) -> None:
-        """Handle a query on a thread, or reply that there are too many."""
-        if not self._worker.offer(partial(handle, query)):
-            with query:
-                query.reply_error("too many calls wait for the robot")
-
-    def close(self) -> None:
-        """Start no more of them; a second call has no effect."""
-        self._worker.close(0)
+def call_worker() -> Worker[Callable[[], object]]:
+    """Return the worker whose threads wait for the replies of queries; both are limited."""
+    return Worker("rosz-fleet-call", threads=_CALLS, capacity=_WAITING, logger=log)
 
 
 class QueryRelay:
-    """Passes queries on, and the replies back, until closed.
+    """Passes queries to another session, and the replies back, until closed.
 
     Args:
-        asked: The session on which the queries come.
-        asked_key: The key expression that they match.
-        served: The session to query.
-        calls: The threads.
-        there: Function that returns the key expression to query for that of a query.
-        back: Function that returns the key to reply on for that of a reply.
-        edit: What changes in the replies; nothing if not given.
+        there: Function that maps the key expression of a query to the other session.
+        back: Function that maps the key of a reply back.
+        edit: Changes to the replies; replies are unchanged when not given.
     """
 
     def __init__(
@@ -263,7 +228,7 @@ class QueryRelay:
         asked: Session,
         asked_key: str,
         served: Session,
-        calls: Calls,
+        calls: Worker[Callable[[], object]],
         *,
         there: Callable[[str], str],
         back: Callable[[str], str],
@@ -279,7 +244,10 @@ class QueryRelay:
         Worker(f"rosz-fleet {asked_key}", self._accept, receive=self._queryable.receive, logger=log)
 
     def _accept(self, query: Query) -> None:
-        self._calls.add(query, self._handle)
+        """Handle a query on another thread, or reply with an error if too many wait."""
+        if not self._calls.offer(partial(self._handle, query)):
+            with query:
+                query.reply_error("too many calls wait for the robot")
 
     def _handle(self, query: Query) -> None:
         edit = self._edit
@@ -302,11 +270,11 @@ class QueryRelay:
                         payload, attachment = edit.payload(reply), edit.attachment(reply)
                         query.forward(reply, self._back(reply.key), payload, attachment)
             except ClosedError:
-                return  # one of the sides ends
+                return  # one of the sessions is being closed
             except RoszError as error:
-                log.warning("a call of '%s' did not pass: %s", query.key, error)
+                log.warning("a call of '%s' failed: %s", query.key, error)
 
     def close(self) -> None:
-        """Pass nothing more, and end what waits; a second call has no effect."""
+        """Stop passing queries, and cancel waiting calls; a second call has no effect."""
         self._queryable.close()
         self._cancel.cancel()

@@ -1,8 +1,8 @@
-"""The topics, services and connections of the network, as clients are told of them.
+"""The catalog of topics, services and connections that clients receive.
 
-The network is followed while there are clients. One thread compares what there is with what clients
-know, and sends them the difference. So each of them hears of changes in their order. Definitions
-of types that are not known here are requested on other threads.
+The network is followed while there are clients. One thread compares the network with the catalog
+and sends the difference to all clients, so that each client receives changes in their order. Other
+threads request the definitions of unknown types.
 """
 
 from __future__ import annotations
@@ -13,47 +13,48 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import msgspec
 
-from rosz.bridges.gate import Gate, Verb
+from rosz.access import AccessPolicy, Verb
 from rosz.errors import NotFoundError, RoszError
 from rosz.graph import Followed, View
 from rosz.lifecycle import Closable, Registration
-from rosz.node.type_description import request_type
+from rosz.node import Node
+from rosz.node.ros2 import request_type
 from rosz.wire import NO_HASH, Kind, Token
 from rosz.worker import Worker
 
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("Catalog", "Channel", "Member")
-
 _GATHER_SECONDS = 0.05
-"""Time in which changes are gathered, as nodes come with many entities at once."""
+"""Time for which changes are collected, since a node declares many entities at once."""
 
 _REQUESTS = 4
-
 _Key = tuple[str, str, str]
 _Graph = dict[str, dict[str, list[str]]]
+"""Nodes by kind of entity and name of topic or service."""
+
+_OBJECTS = {Kind.PUBLISHER: "topics", Kind.SUBSCRIPTION: "topics", Kind.SERVICE: "services"}
 
 
-class Member(Protocol):
-    """A client, as the catalog sees it."""
+class CatalogMember(Protocol):
+    """A client, as the catalog and the parameters see it."""
 
     def send(self, value: Mapping[str, Any]) -> None:
         """Send a message."""
 
+    def report(self, text: str) -> None:
+        """Send an error."""
+
     def drop_channels(self, channels: Iterable[int]) -> None:
-        """End the subscriptions of channels that exist no longer."""
+        """End the subscriptions of channels that no longer exist."""
 
 
-class Channel(msgspec.Struct, frozen=True):
+class AdvertisedChannel(msgspec.Struct, frozen=True):
     """A topic of one type, or a service.
 
     Attributes:
-        id: Number for clients; another definition gets another one.
+        id: Number for clients; a channel with another definition gets another number.
         name: Full name of the topic or service.
         kind: Class of the messages, or of the service.
     """
@@ -63,11 +64,11 @@ class Channel(msgspec.Struct, frozen=True):
     kind: type[Any]
 
     def describe_topic(self) -> dict[str, Any]:
-        """Return the channel as clients are told of it."""
+        """Return the description of the topic for clients."""
         return {"id": self.id, "topic": self.name, **_describe(self.kind)}
 
     def describe_service(self) -> dict[str, Any]:
-        """Return the service as clients are told of it."""
+        """Return the description of the service for clients."""
         return {
             "id": self.id,
             "name": self.name,
@@ -78,128 +79,121 @@ class Channel(msgspec.Struct, frozen=True):
 
 
 class _Listing:
-    """The topics, or the services, that clients know of.
+    """The channels of either topics or services that clients were told of."""
 
-    Attributes:
-        known: What clients know, by name, type and hash.
-        by_number: The same by the number that clients use.
-    """
-
-    def __init__(self, op: str, member: str, describe: Callable[[Channel], dict[str, Any]]) -> None:
+    def __init__(
+        self, op: str, member: str, describe: Callable[[AdvertisedChannel], dict[str, Any]]
+    ) -> None:
         self._op = op
         self._member = member
         self._describe = describe
         self._numbers = itertools.count(1)
-        self.known: dict[_Key, Channel] = {}
-        self.by_number: dict[int, Channel] = {}
+        self.channels: dict[_Key, AdvertisedChannel] = {}
+        self.by_number: dict[int, AdvertisedChannel] = {}
 
-    def add(self, key: _Key, kind: type[Any]) -> Channel:
-        """Give a number to something new."""
-        channel = self.known[key] = Channel(next(self._numbers), key[0], kind)
+    def add(self, key: _Key, kind: type[Any]) -> AdvertisedChannel:
+        """Add a channel, with a new number."""
+        channel = self.channels[key] = AdvertisedChannel(next(self._numbers), key[0], kind)
         self.by_number[channel.id] = channel
         return channel
 
     def retain(self, wanted: Mapping[_Key, Token]) -> list[int]:
-        """Forget what exists no longer; return its numbers."""
-        gone = [self.known.pop(key) for key in list(self.known) if key not in wanted]
+        """Remove the channels that are not wanted any more; return their numbers."""
+        gone = [self.channels.pop(key) for key in list(self.channels) if key not in wanted]
         return [self.by_number.pop(channel.id).id for channel in gone]
 
-    def announce(self, channels: Iterable[Channel]) -> dict[str, Any]:
-        """Return the message that tells clients of channels."""
+    def announce(self, channels: Iterable[AdvertisedChannel]) -> dict[str, Any]:
+        """Return the message that advertises channels to clients."""
         return {
             "op": f"advertise{self._op}",
             f"{self._member}s": [self._describe(channel) for channel in channels],
         }
 
     def withdraw(self, numbers: list[int]) -> dict[str, Any]:
-        """Return the message that tells clients what exists no longer."""
+        """Return the message that tells clients which channels no longer exist."""
         single = "channel" if not self._op else self._member
         return {"op": f"unadvertise{self._op}", f"{single}Ids": numbers}
 
 
-class Catalog:
+class NetworkCatalog:
     """The topics, services and connections of a network, followed while there are members.
 
     Args:
-        node: The node of the bridge.
-        gate: Permissions of the clients.
-        hidden: Whether to show topics and services with a part that begins with ``_``.
+        hidden: Whether to show names of which a part begins with ``_``.
         services: Whether clients may call services.
     """
 
-    def __init__(self, node: Node, gate: Gate, *, hidden: bool, services: bool) -> None:
+    def __init__(self, node: Node, policy: AccessPolicy, *, hidden: bool, services: bool) -> None:
         self._node = node
-        self._gate = gate
+        self._policy = policy
         self._hidden = hidden
         self._lock = threading.Lock()
         self._worker = Worker[Callable[[], object]]("rosz-foxglove-catalog", logger=node.log)
-        self._requests = Worker[Callable[[], object]]("rosz-foxglove-types", threads=_REQUESTS)
-        self._requested: dict[tuple[str, str], type[Any] | None] = {}
-        self._members: set[Member] = set()
-        self._watchers: set[Member] = set()
+        self._types = RequestedTypes(node, self._worker.submit, self._update, self._report)
+        self._members: set[CatalogMember] = set()
+        self._watchers: set[CatalogMember] = set()
         self._pending = False
         self._followed: Followed | None = None
         self._listening: Closable | None = None
-        self._topics = _Listing("", "channel", Channel.describe_topic)
-        self._services = _Listing("Services", "service", Channel.describe_service)
+        self._topics = _Listing("", "channel", AdvertisedChannel.describe_topic)
+        self._services = _Listing("Services", "service", AdvertisedChannel.describe_service)
         self._listings = (self._topics, self._services) if services else (self._topics,)
-        self._graph: _Graph = {}
+        self._connections = ConnectionGraph(self._is_in_graph)
 
-    def join(self, member: Member) -> None:
-        """Tell a client of all that there is, and of changes from now on."""
+    def join(self, member: CatalogMember) -> None:
+        """Send the whole catalog to a client, and from now on its changes."""
         self._worker.submit(partial(self._join, member))
 
-    def leave(self, member: Member) -> None:
-        """Tell a client no more; without clients, the network is not followed."""
+    def leave(self, member: CatalogMember) -> None:
+        """Send nothing more to a client; after the last client, stop following the network."""
         self._worker.submit(partial(self._leave, member))
 
-    def watch(self, member: Member) -> None:
-        """Send a client the graph of connections, and its changes from now on."""
+    def watch(self, member: CatalogMember) -> None:
+        """Send the graph of connections to a client, and from now on its changes."""
         self._worker.submit(partial(self._watch, member))
 
-    def unwatch(self, member: Member) -> None:
-        """Send a client no more changes of the graph."""
+    def unwatch(self, member: CatalogMember) -> None:
+        """Stop sending changes of the graph to a client."""
         self._worker.submit(partial(self._watchers.discard, member))
 
     def know(self, kind: type[Any]) -> None:
-        """Use the definition of a type that a client brings along."""
-        key = kind._type_name, kind._type_hash
-        self._worker.submit(partial(self._requested.__setitem__, key, kind))
+        """Add a type that a client has defined."""
+        self._worker.submit(partial(self._types.add, kind))
 
-    def topic(self, number: int) -> Channel:
-        """Return the channel of a number.
+    def topic(self, number: int) -> AdvertisedChannel:
+        """Return the channel with a number.
 
         Raises:
-            NotFoundError: There is none.
+            NotFoundError: No channel has the number.
         """
         return _at(self._topics, number, "channel")
 
-    def service(self, number: int) -> Channel:
-        """Return the service of a number.
+    def service(self, number: int) -> AdvertisedChannel:
+        """Return the service with a number.
 
         Raises:
-            NotFoundError: There is none.
+            NotFoundError: No service has the number.
         """
         return _at(self._services, number, "service")
 
     def close(self) -> None:
         """Stop following the network."""
-        self._requests.close()
+        self._types.close()
         self._worker.close()
         self._unfollow()
 
-    # On the thread of the worker.
+    # The following methods run on the thread of the worker, unless they say otherwise.
 
-    def _join(self, member: Member) -> None:
+    def _join(self, member: CatalogMember) -> None:
         self._members.add(member)
         for listing in self._listings:
-            member.send(listing.announce(listing.known.values()))
+            member.send(listing.announce(listing.channels.values()))
         if self._followed is None:
             self._followed = self._node.context.graph.follow_all()
             self._listening = Registration(self._followed.listen(self._changed))
             self._update()
 
-    def _leave(self, member: Member) -> None:
+    def _leave(self, member: CatalogMember) -> None:
         self._members.discard(member)
         self._watchers.discard(member)
         if not self._members:
@@ -210,19 +204,19 @@ class Catalog:
             self._listening.close()
             self._followed.close()
             self._followed = self._listening = None
-        self._forget_requests(set())
+        self._types.retain(set())
         for listing in self._listings:
             listing.retain({})
 
-    def _watch(self, member: Member) -> None:
+    def _watch(self, member: CatalogMember) -> None:
         if member in self._members and member not in self._watchers and self._followed is not None:
             if not self._watchers:
-                self._graph = self._connections(self._followed.view())
+                self._connections.read(self._followed.view())
             self._watchers.add(member)
-            member.send(_difference({}, self._graph))
+            member.send(self._connections.describe())
 
     def _changed(self, _token: Token, _alive: bool) -> None:
-        """Look at the network soon; on the thread of the graph."""
+        """Schedule an update. This runs on the thread of the graph."""
         with self._lock:
             if self._pending:
                 return
@@ -236,11 +230,9 @@ class Catalog:
             return
         view = self._followed.view()
         alive = {(token.type_name, token.type_hash) for token in view.tokens}
-        self._forget_requests(alive)
-        if self._watchers:
-            before, self._graph = self._graph, self._connections(view)
-            if before != self._graph:
-                _send(self._watchers, _difference(before, self._graph))
+        self._types.retain(alive)
+        if self._watchers and (changes := self._connections.read(view)) is not None:
+            _send(self._watchers, changes)
         self._compare(self._topics, self._wanted_topics(view))
         if self._services in self._listings:
             self._compare(self._services, self._wanted_services(view))
@@ -251,115 +243,144 @@ class Catalog:
                 for member in self._members:
                     member.drop_channels(gone)
             _send(self._members, listing.withdraw(gone))
-        missing = {key: token for key, token in wanted.items() if key not in listing.known}
-        found = [
+        missing = {key: token for key, token in wanted.items() if key not in listing.channels}
+        channels = [
             listing.add(key, kind)
             for key, token in missing.items()
-            if (kind := self._kind(token)) is not None
+            if (kind := self._types.find(token)) is not None
         ]
-        if found:
-            _send(self._members, listing.announce(found))
+        if channels:
+            _send(self._members, listing.announce(channels))
 
-    def _kind(self, token: Token) -> type[Any] | None:
-        """Return the class of a type, or None while its definition is on its way."""
-        types, name = self._node.context.types, token.type_name
-        known: type[Any] | None = None
-        with suppress(RoszError):
-            known = types.service(name) if token.kind is Kind.SERVICE else types.message(name)
-        if known is not None and token.type_hash in {NO_HASH, known._type_hash}:
-            return known
-        kind = name, token.type_hash
-        if kind not in self._requested:
-            self._requested[kind] = None
-            self._requests.submit(partial(self._request, kind, token))
-        return self._requested[kind]
-
-    def _forget_requests(self, alive: set[tuple[str, str]]) -> None:
-        """Let types be requested again that nobody described, and that nobody has any more."""
-        self._requested = {
-            kind: found
-            for kind, found in self._requested.items()
-            if found is not None or kind in alive
-        }
-
-    def _request(self, kind: tuple[str, str], token: Token) -> None:
-        """Request a definition; on a thread for requests."""
-        try:
-            found = request_type(self._node, token)
-        except RoszError as error:
-            self._worker.submit(partial(self._refuse, token, error))
-        else:
-            self._worker.submit(partial(self._accept, kind, found))
-
-    def _accept(self, kind: tuple[str, str], found: type[Any]) -> None:
-        self._requested[kind] = found
-        self._update()
-
-    def _refuse(self, token: Token, error: RoszError) -> None:
-        """Report a type that its node does not describe."""
-        text = f"'{token.name}' is not shown, as its type is not known: {error}"
+    def _report(self, text: str) -> None:
+        """Warn that a node does not describe a type."""
         self._node.log.warning("%s", text)
         _send(self._members, {"op": "status", "level": 1, "message": text})
 
     def _wanted_topics(self, view: View) -> dict[_Key, Token]:
-        """Return a publisher of each topic and type, or else a subscription of another node."""
-        found: dict[tuple[str, str], Token] = {}
+        """Return, by topic and type, a publisher or else a subscription of another node."""
+        first: dict[tuple[str, str], Token] = {}
         tokens = view.entities(Kind.PUBLISHER) + view.entities(Kind.SUBSCRIPTION)
         for token in tokens:
             own = token.kind is Kind.SUBSCRIPTION and token.node_name == self._node.name
-            if not own and self._is_shown("topics", token.name):
-                found.setdefault((token.name, token.type_name), token)
-        return {(*key, token.type_hash): token for key, token in found.items()}
+            if not own and self._is_shown("subscribe", token.name):
+                first.setdefault((token.name, token.type_name), token)
+        return {(*key, token.type_hash): token for key, token in first.items()}
 
     def _wanted_services(self, view: View) -> dict[_Key, Token]:
-        found: dict[str, Token] = {}
+        first: dict[str, Token] = {}
         for token in view.entities(Kind.SERVICE):
-            if self._is_shown("services", token.name):
-                found.setdefault(token.name, token)
-        return {(name, one.type_name, one.type_hash): one for name, one in found.items()}
+            if self._is_shown("call", token.name):
+                first.setdefault(token.name, token)
+        return {(name, t.type_name, t.type_hash): t for name, t in first.items()}
 
-    def _is_shown(self, what: str, name: str) -> bool:
-        verb: Verb = "subscribe" if what == "topics" else "call"
-        return (self._hidden or "/_" not in name) and not self._gate.objection(verb, name)
+    def _is_shown(self, verb: Verb, name: str) -> bool:
+        return (self._hidden or "/_" not in name) and not self._policy.objection(verb, name)
 
-    def _connections(self, view: View) -> _Graph:
+    def _is_in_graph(self, objects: str, name: str) -> bool:
+        return self._policy.shows(objects, name) and (self._hidden or "/_" not in name)
+
+
+class RequestedTypes:
+    """Finds the classes of types, and requests unknown ones; used on one thread.
+
+    Args:
+        submit: Function that runs a task on that thread.
+        arrived: Function called when a requested class is available.
+        failed: Function called with the reason when a node does not describe a type.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        submit: Callable[[Callable[[], object]], object],
+        arrived: Callable[[], object],
+        failed: Callable[[str], object],
+    ) -> None:
+        self._node = node
+        self._submit = submit
+        self._arrived = arrived
+        self._failed = failed
+        self._worker = Worker[Callable[[], object]]("rosz-foxglove-types", threads=_REQUESTS)
+        self._classes: dict[tuple[str, str], type[Any] | None] = {}
+
+    def add(self, cls: type[Any]) -> None:
+        """Add a type that a client has defined."""
+        self._classes[cls._type_name, cls._type_hash] = cls
+
+    def find(self, token: Token) -> type[Any] | None:
+        """Return the class of an entity's type, or None until its definition has arrived."""
+        types, name = self._node.context.types, token.type_name
+        cls: type[Any] | None = None
+        with suppress(RoszError):
+            cls = types.service(name) if token.kind is Kind.SERVICE else types.message(name)
+        if cls is not None and token.type_hash in {NO_HASH, cls._type_hash}:
+            return cls
+        key = name, token.type_hash
+        if key not in self._classes:
+            self._classes[key] = None
+            self._worker.submit(partial(self._request, key, token))
+        return self._classes[key]
+
+    def retain(self, alive: set[tuple[str, str]]) -> None:
+        """Forget unanswered requests for types that no entity has, so that they can be repeated.
+
+        Args:
+            alive: Names and hashes of the types of all entities.
+        """
+        self._classes = {
+            key: cls for key, cls in self._classes.items() if cls is not None or key in alive
+        }
+
+    def _request(self, key: tuple[str, str], token: Token) -> None:
+        """Request a definition. This runs on a thread for requests."""
+        try:
+            cls = request_type(self._node, token)
+        except RoszError as error:
+            text = f"'{token.name}' is not shown, because its type is not known: {error}"
+            self._submit(partial(self._failed, text))
+        else:
+            self._submit(partial(self._accept, key, cls))
+
+    def _accept(self, key: tuple[str, str], cls: type[Any]) -> None:
+        self._classes[key] = cls
+        self._arrived()
+
+    def close(self) -> None:
+        """Stop requesting definitions."""
+        self._worker.close()
+
+
+class ConnectionGraph:
+    """The graph of connections, as it was last sent to clients.
+
+    Args:
+        shows: Function that returns whether clients may see a name of a topic or service.
+    """
+
+    def __init__(self, shows: Callable[[str, str], bool]) -> None:
+        self._shows = shows
+        self._graph: _Graph = {}
+
+    def read(self, view: View) -> dict[str, Any] | None:
+        """Update the graph; return the message with the changes, or None without changes."""
         graph: _Graph = {}
-        for kind, what in (
-            (Kind.PUBLISHER, "topics"),
-            (Kind.SUBSCRIPTION, "topics"),
-            (Kind.SERVICE, "services"),
-        ):
-            found: defaultdict[str, set[str]] = defaultdict(set)
+        for kind, objects in _OBJECTS.items():
+            nodes: defaultdict[str, set[str]] = defaultdict(set)
             for token in view.entities(kind):
-                if self._gate.shows(what, token.name) and (self._hidden or "/_" not in token.name):
-                    found[token.name].add(token.node_name)
-            graph[kind.name] = {name: sorted(found[name]) for name in sorted(found)}
-        return graph
+                if self._shows(objects, token.name):
+                    nodes[token.name].add(token.node_name)
+            graph[kind.name] = {name: sorted(nodes[name]) for name in sorted(nodes)}
+        before, self._graph = self._graph, graph
+        return None if before == graph else _difference(before, graph)
 
-
-def _at(listing: _Listing, number: int, what: str) -> Channel:
-    channel = listing.by_number.get(number)
-    if channel is None:
-        raise NotFoundError(f"there is no {what} {number}")
-    return channel
-
-
-def _send(members: Iterable[Member], value: Mapping[str, Any]) -> None:
-    for member in members:
-        member.send(value)
-
-
-def _describe(cls: type[Any]) -> dict[str, Any]:
-    return {
-        "encoding": "cdr",
-        "schemaName": cls._type_name,
-        "schemaEncoding": "ros2msg",
-        "schema": cls._full_text,
-    }
+    def describe(self) -> dict[str, Any]:
+        """Return the message with the whole graph."""
+        return _difference({}, self._graph)
 
 
 def _difference(before: _Graph, after: _Graph) -> dict[str, Any]:
-    """Return the message that makes one graph of another."""
+    """Return the message with the changes from one graph to another."""
 
     def changed(kind: Kind, member: str) -> list[dict[str, Any]]:
         old, new = before.get(kind.name, {}), after[kind.name]
@@ -381,4 +402,25 @@ def _difference(before: _Graph, after: _Graph) -> dict[str, Any]:
         "advertisedServices": changed(Kind.SERVICE, "providerIds"),
         "removedTopics": sorted(names(before, *both) - names(after, *both)),
         "removedServices": sorted(names(before, Kind.SERVICE) - names(after, Kind.SERVICE)),
+    }
+
+
+def _at(listing: _Listing, number: int, what: str) -> AdvertisedChannel:
+    channel = listing.by_number.get(number)
+    if channel is None:
+        raise NotFoundError(f"there is no {what} {number}")
+    return channel
+
+
+def _send(members: Iterable[CatalogMember], value: Mapping[str, Any]) -> None:
+    for member in members:
+        member.send(value)
+
+
+def _describe(cls: type[Any]) -> dict[str, Any]:
+    return {
+        "encoding": "cdr",
+        "schemaName": cls._type_name,
+        "schemaEncoding": "ros2msg",
+        "schema": cls._full_text,
     }

@@ -1,52 +1,22 @@
 """The messages of the Foxglove websocket protocol, version 1; pure.
 
-Texts are JSON objects with an ``op``. Binary messages begin with a number that says what they are.
+Texts are JSON objects with an ``op``. Binary messages begin with the number of their kind.
 Numbers in them are little-endian (github.com/foxglove/ws-protocol, docs/spec.md).
 """
 
 from __future__ import annotations
 
+import functools
+import operator
 import struct
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import msgspec
 
 from rosz.errors import UsageError
 
-__all__ = (
-    "SUBPROTOCOLS",
-    "Advertise",
-    "ChannelChoice",
-    "ClientChannel",
-    "ClientMessage",
-    "FetchAsset",
-    "GetParameters",
-    "Level",
-    "Parameter",
-    "Publish",
-    "ServiceCall",
-    "SetParameters",
-    "Subscribe",
-    "SubscribeConnectionGraph",
-    "SubscribeParameterUpdates",
-    "Unadvertise",
-    "Unsubscribe",
-    "UnsubscribeConnectionGraph",
-    "UnsubscribeParameterUpdates",
-    "asset_frame",
-    "data_head",
-    "op_name",
-    "read",
-    "refusal_frame",
-    "response_frame",
-    "time_frame",
-)
-
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 """Names of the protocol: that of today's clients, and that of older ones."""
-
-Level: TypeAlias = Literal[0, 1, 2]
-"""Of a status message: information, warning or error."""
 
 _Number = Annotated[int, msgspec.Meta(ge=0, le=0xFFFF_FFFF)]
 _DATA, _TIME, _RESPONSE, _ASSET = 1, 2, 3, 4
@@ -68,13 +38,13 @@ class ChannelChoice(msgspec.Struct, frozen=True, rename="camel"):
     channel_id: _Number
 
 
-class Subscribe(_Message, frozen=True):
+class SubscribeChannels(_Message, frozen=True, tag="subscribe"):
     """A client subscribes to channels."""
 
     subscriptions: list[ChannelChoice]
 
 
-class Unsubscribe(_Message, frozen=True, rename="camel"):
+class UnsubscribeChannels(_Message, frozen=True, rename="camel", tag="unsubscribe"):
     """A client ends subscriptions."""
 
     subscription_ids: list[_Number]
@@ -91,19 +61,19 @@ class ClientChannel(msgspec.Struct, frozen=True, rename="camel"):
     schema_encoding: str | None = None
 
 
-class Advertise(_Message, frozen=True):
+class AdvertiseChannels(_Message, frozen=True, tag="advertise"):
     """A client begins to publish."""
 
     channels: list[ClientChannel]
 
 
-class Unadvertise(_Message, frozen=True, rename="camel"):
+class UnadvertiseChannels(_Message, frozen=True, rename="camel", tag="unadvertise"):
     """A client ends channels on which it publishes."""
 
     channel_ids: list[_Number]
 
 
-class Parameter(msgspec.Struct, frozen=True, omit_defaults=True):
+class FoxgloveParameter(msgspec.Struct, frozen=True, omit_defaults=True):
     """A parameter; one without a value is not set."""
 
     name: str
@@ -121,7 +91,7 @@ class GetParameters(_Message, frozen=True, rename="camel"):
 class SetParameters(_Message, frozen=True):
     """A client sets parameters, or deletes those without a value."""
 
-    parameters: list[Parameter]
+    parameters: list[FoxgloveParameter]
     id: str | None = None
 
 
@@ -152,7 +122,7 @@ class FetchAsset(_Message, frozen=True, rename="camel"):
     request_id: _Number
 
 
-class Publish(msgspec.Struct, frozen=True, tag_field="op", tag="message"):
+class PublishedData(msgspec.Struct, frozen=True, tag_field="op", tag="message"):
     """A binary message with data for a channel of the client."""
 
     channel: int
@@ -168,23 +138,11 @@ class ServiceCall(msgspec.Struct, frozen=True, tag_field="op", tag="service call
     data: bytes
 
 
-_Json: TypeAlias = (
-    Subscribe
-    | Unsubscribe
-    | Advertise
-    | Unadvertise
-    | GetParameters
-    | SetParameters
-    | SubscribeParameterUpdates
-    | UnsubscribeParameterUpdates
-    | SubscribeConnectionGraph
-    | UnsubscribeConnectionGraph
-    | FetchAsset
-)
-ClientMessage: TypeAlias = _Json | Publish | ServiceCall
+ClientMessage: TypeAlias = _Message | PublishedData | ServiceCall
 """A message of a client."""
 
-_json_decoder: msgspec.json.Decoder[_Json] = msgspec.json.Decoder(_Json)
+_kinds: Any = functools.reduce(operator.or_, _Message.__subclasses__())
+_json_decoder: msgspec.json.Decoder[_Message] = msgspec.json.Decoder(_kinds)
 
 
 def read(message: str | bytes) -> ClientMessage:
@@ -201,11 +159,11 @@ def read(message: str | bytes) -> ClientMessage:
         raise UsageError(f"not a message of the protocol: {error}, in {message[:100]!r}") from error
 
 
-def _read_binary(message: bytes) -> Publish | ServiceCall:
+def _read_binary(message: bytes) -> PublishedData | ServiceCall:
     try:
         if message[:1] == bytes((_DATA,)):
             (channel,) = struct.unpack_from("<I", message, 1)
-            return Publish(channel, message[5:])
+            return PublishedData(channel, message[5:])
         if message[:1] == bytes((_CALL,)):
             service, call, size = struct.unpack_from("<III", message, 1)
             encoding, data = message[13 : 13 + size], message[13 + size :]
@@ -221,13 +179,8 @@ def _read_binary(message: bytes) -> Publish | ServiceCall:
     )
 
 
-def op_name(message: ClientMessage) -> str:
-    """Return the name of what a client does with a message."""
-    return str(message.__struct_config__.tag)
-
-
 def data_head(subscription: int, time_ns: int) -> bytes:
-    """Return what stands before a message of a channel, for a subscription."""
+    """Return the head of a message of a channel, for a subscription."""
     return struct.pack("<BIQ", _DATA, subscription, time_ns)
 
 

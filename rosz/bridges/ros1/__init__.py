@@ -6,18 +6,13 @@ registrations. The others use sockets, nodes and the parameter store.
 
 from __future__ import annotations
 
-from rosz.bridges.ros1.attach import AttachedBridge, Choice
-from rosz.bridges.ros1.bridge import (
-    MASTER_PORT,
-    MasterBridge,
-    open_master,
-    running_master,
-)
+from rosz.bridges.ros1.attach import AttachedBridge, CrossingNames
+from rosz.bridges.ros1.bridge import MASTER_PORT, MasterBridge, open_master, running_master
 
 __all__ = (
     "MASTER_PORT",
     "AttachedBridge",
-    "Choice",
+    "CrossingNames",
     "MasterBridge",
     "open_master",
     "running_master",

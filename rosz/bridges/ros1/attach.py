@@ -1,85 +1,71 @@
-"""A bridge to a roscore that runs already: rosz joins it as a node.
+"""A bridge to a running roscore, which rosz joins as a node.
 
-The state of the master is read once a second. Its nodes appear on the network; what the network
-publishes and serves is registered there under the name of the bridge. Of several bridges to one
-master on one network only the oldest works, and the next takes over when it ends.
+The state of the master is read once a second, and its nodes appear on the network. The bridge
+registers topics and services of the network at the master, under its own name. If several bridges
+connect one master and one network, only the oldest works; the next one takes over when it ends.
 """
 
 from __future__ import annotations
 
 import re
 import socket
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
-from typing import Any, Self
+from typing import Any
 
 import msgspec
 
-from rosz.bridges.gate import matches
+from rosz.access import NamePattern, matches_any
+from rosz.bridges.ros1.joined_params import RUN_ID, JoinedParameters
 from rosz.bridges.ros1.mirror import Mirror
 from rosz.bridges.ros1.node_api import NodeApi
 from rosz.bridges.ros1.peers import Address, call, multicall
-from rosz.bridges.ros1.registry import Change, Entry, Role
-from rosz.bridges.ros1.server import Server
-from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, Shared
+from rosz.bridges.ros1.registry import Change, RegistryEntry, Role
+from rosz.bridges.ros1.server import Ros1Server
+from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, BridgeResources
 from rosz.bridges.ros1.sockets import log
 from rosz.environment import Environment
-from rosz.errors import (
-    DecodeError,
-    EncodeError,
-    ParamNotFound,
-    RoszError,
-    ServiceError,
-    TransportError,
-)
-from rosz.lifecycle import Registration
+from rosz.errors import DecodeError, RoszError, ServiceError, TransportError
+from rosz.lifecycle import Closing, Registration
 from rosz.names import ros1_type
 from rosz.node import BridgedNode, Context
-from rosz.params import leaves, normalise, split
-from rosz.params.replica import Changed
 from rosz.wire import Kind, own_key
 from rosz.worker import Worker
-
-__all__ = ("AttachedBridge", "Choice")
 
 _POLL_SECONDS = 1.0
 _LOOK_SECONDS = 0.05
 _TOKENS_TIMEOUT = 1.0
-_RUN_ID = "/run_id"
 _UNKNOWN = object()
 _Names = list[tuple[str, list[str]]]
 _State = tuple[dict[str, list[str]], ...]
-"""The nodes of each topic that is published, of each that is subscribed to, of each service."""
-
-_OWN_PARAMS = (_RUN_ID, "/rosdistro", "/rosversion", "/roslaunch")
-"""Parameters that tell of one master, and belong to it alone."""
+"""The nodes of each published topic, of each subscribed topic, and of each service."""
 
 
-class Choice(msgspec.Struct, frozen=True):
-    """Which names cross; each is a list of patterns with ``*``, and an empty one means all.
+class CrossingNames(msgspec.Struct, frozen=True):
+    """The names that cross, as patterns with ``*``; an empty tuple means all names.
 
     Attributes:
-        topics: Topics.
-        services: Services.
-        params: Parameters.
+        topics: Patterns of topics.
+        services: Patterns of services.
+        params: Patterns of parameters.
     """
 
-    topics: tuple[str, ...] = ()
-    services: tuple[str, ...] = ()
-    params: tuple[str, ...] = ()
+    topics: tuple[NamePattern, ...] = ()
+    services: tuple[NamePattern, ...] = ()
+    params: tuple[NamePattern, ...] = ()
 
 
-class AttachedBridge:
-    """A node at a master of ROS 1, through which both networks are one.
+class AttachedBridge(Closing):
+    """A node at a master of ROS 1 that connects both networks.
 
     Args:
         master: URI of the master.
         environment: Settings; those of the process when not given.
-        choice: Names of ROS 1 that cross.
+        names: Names of ROS 1 that cross.
         namespace: Namespace on the network for all names of ROS 1, such as ``/robot1``.
 
     Raises:
-        DecodeError: The URI is not one.
+        DecodeError: The URI of the master is not valid.
         TransportError: The host of the master is not known, or the session cannot be opened.
         UsageError: A variable of the environment has an invalid value.
     """
@@ -89,25 +75,25 @@ class AttachedBridge:
         master: str,
         environment: Environment | None = None,
         *,
-        choice: Choice = Choice(),  # noqa: B008  # frozen
+        names: CrossingNames = CrossingNames(),  # noqa: B008  # frozen
         namespace: str = "",
     ) -> None:
         self._master = master
-        self._choice = choice
+        self._names = names
         self._address = Address.parse(master)
         host = _own_address(self._address)
         context = Context(environment or Environment.read())
-        self._shared = shared = Shared(context, "", namespace.rstrip("/"))
+        self._shared = shared = BridgeResources(context, namespace.rstrip("/"))
         self._lifecycle = shared.lifecycle
         self._lifecycle.keep(context)
         self._lifecycle.keep(Registration(shared.close))
         self._worker: Worker[Callable[[], object]] = Worker("rosz-ros1-master", logger=log)
-        self._entries: set[Entry] = set()
+        self._params = JoinedParameters(shared, self._worker, self._call, names.params)
+        self._entries: set[RegistryEntry] = set()
         self._uris: dict[str, str] = {}
         self._ended: set[tuple[str, str]] = set()
         self._run_id: object = _UNKNOWN
         self._reported = ""
-        self._active = False
         self._looking = False
         try:
             self._open(host)
@@ -118,29 +104,25 @@ class AttachedBridge:
     def _open(self, host: str) -> None:
         shared = self._shared
         context = shared.context
-        server = self._lifecycle.keep(Server(shared.loop, host, 0))
+        server = self._lifecycle.keep(Ros1Server(shared.loop, host, 0))
         self._uri = f"http://{host}:{server.port}/"
-        self._service_uri = _service_uri(self._uri)
         machine = re.sub(r"\W", "_", socket.gethostname(), flags=re.ASCII)
         shared.name = f"{BRIDGE}{machine}_{server.port}"
-        self._own = self._lifecycle.keep(BridgedNode(context, shared.name, lambda _reason: None))
-        api = NodeApi(shared, server.port, self._param_update)
+        own = self._lifecycle.keep(BridgedNode(context, shared.name, lambda _reason: None))
+        api = NodeApi(shared, server.port, self._params.update)
         self._mirror = api.mirror = Mirror(
-            shared, self._own, _keep, lambda _topic: self._look(), self._look
+            shared, own, _keep, lambda _topic: self._look(), self._look
         )
         self._lifecycle.keep(self._mirror)
         self._lifecycle.keep(Registration(self._worker.close))
         self._lifecycle.keep(Registration(self._leave))
         self._rank = f"{context.session.stamp().time:020}-{context.session.zid}"
         self._lifecycle.keep(context.session.token(self._mark(self._rank)))
-        self._lifecycle.keep(context.params.watch((), self._changed))
-        server.start(
-            lambda call, stream: api.answer("", call, stream),
-            self._mirror.accept,
-        )
+        self._lifecycle.keep(context.params.watch((), self._params.changed))
+        server.start(lambda call, stream: api.answer("", call, stream), self._mirror.accept)
         shared.prober.start(
             lambda: self._uris,
-            lambda *found: self._worker.submit(partial(self._on_probe, *found)),
+            lambda *probed: self._worker.submit(partial(self._on_probe, *probed)),
         )
         self._worker.submit(self._poll)
 
@@ -148,22 +130,16 @@ class AttachedBridge:
         """Leave the master; a second call has no effect."""
         self._lifecycle.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
-
-    # The master, on the thread of the worker.
+    # Reading the state of the master, on the thread of the worker.
 
     def _look(self) -> None:
-        """Look at the master soon."""
+        """Read the state of the master soon, before the next poll."""
         if not self._looking:
             self._looking = True
             self._worker.later(_LOOK_SECONDS, self._look_once)
 
     def _poll(self) -> None:
-        """Look at the master once a second."""
+        """Read the state of the master, and schedule the next poll."""
         try:
             self._look_once()
         finally:
@@ -189,39 +165,31 @@ class AttachedBridge:
         name = self._shared.name
         state, types, run_id = multicall(
             self._master,
-            [
-                ("getSystemState", (name,)),
-                ("getTopicTypes", (name,)),
-                ("getParam", (name, _RUN_ID)),
-            ],
+            [("getSystemState", (name,)), ("getTopicTypes", (name,)), ("getParam", (name, RUN_ID))],
         )
         nodes = _read_state(state)
-        kinds = dict(_convert(types, list[tuple[str, str]]))
+        types_by_topic = dict(_convert(types, list[tuple[str, str]]))
         self._check_master()
-        self._active = self._is_first()
-        if not self._active:
+        self._params.active = self._is_first()
+        if not self._params.active:
             self._uris = {}
             self._apply(set())
             return
-        self._apply(self._read(nodes, kinds))
+        self._apply(self._read(nodes, types_by_topic))
         self._register(self._without_ended(nodes))
         if run_id != self._run_id:
-            self._join_params()
+            self._params.join(self._uri)
             self._run_id = run_id
 
     def _check_master(self) -> None:
-        """Refuse a master that is one of this network.
-
-        Raises:
-            ServiceError: It is one; what it knows is on the network already.
-        """
+        """Refuse a master that belongs to this network."""
         nodes = self._shared.context.graph.view().nodes()
-        own = [node for node in nodes if node.startswith(MASTER_NODE)]
-        calls = [("lookupNode", (self._shared.name, node)) for node in own]
+        masters = [node for node in nodes if node.startswith(MASTER_NODE)]
+        calls = [("lookupNode", (self._shared.name, node)) for node in masters]
         if any(multicall(self._master, calls)):
             raise ServiceError(
-                "it belongs to this network already (`rosz core --ros1`), so there is nothing to"
-                " join: ROS_DOMAIN_ID and ROSZ_RENDEZVOUS name another network"
+                "it belongs to this network already (`rosz core --ros1`); to join it from another"
+                " network, set ROS_DOMAIN_ID or ROSZ_RENDEZVOUS"
             )
 
     def _is_first(self) -> bool:
@@ -232,44 +200,27 @@ class AttachedBridge:
         return oldest >= self._rank
 
     def _mark(self, rank: str) -> str:
-        """Return the key of the token of a bridge to this master."""
+        """Return the key of the token of a bridge to this master; ``*`` matches every rank."""
         place = re.sub(r"[^A-Za-z0-9._-]", "_", f"{self._address.host}_{self._address.port}")
         space = self._shared.namespace.replace("/", "%") or "%"
         return own_key(self._shared.context.domain, "ros1", place, space, rank)
 
-    def _read(self, state: _State, types: dict[str, str]) -> set[Entry]:
+    def _read(self, state: _State, types: dict[str, str]) -> set[RegistryEntry]:
         """Return the registrations that cross."""
-        roles: tuple[tuple[Role, tuple[str, ...]], ...] = (
-            ("publisher", self._choice.topics),
-            ("subscriber", self._choice.topics),
-            ("service", self._choice.services),
+        crossing = self._crossing(state)
+        nodes = {node for part in state for listed in part.values() for node in listed}
+        bridges = {node for node in nodes if node.startswith(BRIDGE)}
+        services = sorted({name for role, name, _ in crossing if role == "service"})
+        of_node, of_service = self._look_up(
+            sorted({node for _, _, node in crossing} | bridges), services
         )
-        found: list[tuple[Role, str, str]] = [
-            (role, name, node)
-            for (role, patterns), known in zip(roles, state, strict=False)
-            for name, nodes in known.items()
-            if matches(patterns, name)
-            for node in nodes
-            if not node.startswith(BRIDGE)
-        ]
-        bridges = {n for known in state for nodes in known.values() for n in nodes if _is_bridge(n)}
-        nodes = sorted({node for _, _, node in found} | bridges)
-        services = sorted({name for role, name, _ in found if role == "service"})
-        own = self._shared.name
-        uris = multicall(
-            self._master,
-            [("lookupNode", (own, node)) for node in nodes]
-            + [("lookupService", (own, name)) for name in services],
-        )
-        of_node = dict(zip(nodes, uris, strict=False))
-        of_service = dict(zip(services, uris[len(nodes) :], strict=False))
         before = self._uris.items()
         self._uris = {node: self._reachable(uri) for node, uri in of_node.items() if uri}
         self._ended &= self._uris.items()
         for node, uri in self._uris.items() - before:
             self._shared.prober.check(node, uri)
         return {
-            Entry(
+            RegistryEntry(
                 role,
                 name,
                 node,
@@ -277,13 +228,42 @@ class AttachedBridge:
                 types.get(name, "*") if role != "service" else "",
                 self._reachable(of_service[name]) if role == "service" else "",
             )
-            for role, name, node in found
+            for role, name, node in crossing
             if node in self._uris and (role != "service" or of_service[name])
             if (node, self._uris[node]) not in self._ended
         }
 
+    def _crossing(self, state: _State) -> list[tuple[Role, str, str]]:
+        """Return role, name and node of each registration that crosses, except those of bridges."""
+        roles: tuple[tuple[Role, tuple[NamePattern, ...]], ...] = (
+            ("publisher", self._names.topics),
+            ("subscriber", self._names.topics),
+            ("service", self._names.services),
+        )
+        return [
+            (role, name, node)
+            for (role, patterns), nodes_by_name in zip(roles, state, strict=False)
+            for name, nodes in nodes_by_name.items()
+            if matches_any(patterns, name)
+            for node in nodes
+            if not node.startswith(BRIDGE)
+        ]
+
+    def _look_up(
+        self, nodes: list[str], services: list[str]
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the URIs of nodes and of services."""
+        own = self._shared.name
+        uris = multicall(
+            self._master,
+            [("lookupNode", (own, node)) for node in nodes]
+            + [("lookupService", (own, name)) for name in services],
+        )
+        of_node = dict(zip(nodes, uris, strict=False))
+        return of_node, dict(zip(services, uris[len(nodes) :], strict=False))
+
     def _reachable(self, uri: str) -> str:
-        """Return a URI; on the master's machine if the host is not known here."""
+        """Return a URI; the host becomes that of the master if it cannot be resolved here."""
         address = Address.parse(uri)
         try:
             socket.getaddrinfo(address.host, None, socket.AF_INET)
@@ -292,12 +272,12 @@ class AttachedBridge:
         return uri
 
     def _on_probe(self, node: str, uri: str, is_there: bool) -> None:
-        """Take a node from the network that has ended: the master keeps its registrations."""
+        """Remove an ended node from the network, because the master keeps its registrations."""
         if is_there == ((node, uri) in self._ended):
             (self._ended.discard if is_there else self._ended.add)((node, uri))
             self._look()
 
-    def _apply(self, entries: set[Entry]) -> None:
+    def _apply(self, entries: set[RegistryEntry]) -> None:
         gone, new = self._entries - entries, entries - self._entries
         self._entries = entries
         changes = [Change(entry, alive=False) for entry in gone]
@@ -305,72 +285,71 @@ class AttachedBridge:
         if changes:
             self._mirror.apply(changes)
 
-    # What the network has, at the master.
+    # Registering topics and services of the network at the master.
 
     def _register(self, state: _State) -> None:
-        """Register what the network publishes and serves, and unregister what it does not."""
+        """Register topics and services of the network, and unregister those that have ended."""
         own, uri = self._shared.name, self._uri
-        topics = self._offered(Kind.PUBLISHER, self._choice.topics)
+        topics = self._offered(Kind.PUBLISHER, self._names.topics)
         published, _, served = state
         for topic, type_name in topics.items():
             if own not in published.get(topic, ()):
-                kind = ros1_type(topic, type_name)
-                self._call("registerPublisher", topic, kind, uri)
+                self._call("registerPublisher", topic, ros1_type(topic, type_name), uri)
         for topic, nodes in published.items():
             if own in nodes and topic not in topics:
                 self._call("unregisterPublisher", topic, uri)
-        services = self._offered(Kind.SERVICE, self._choice.services)
+        services = self._offered(Kind.SERVICE, self._names.services)
         for service in services:
             if service not in served:
-                self._call("registerService", service, self._service_uri, uri)
+                self._call("registerService", service, _service_uri(self._uri), uri)
         for service, nodes in served.items():
             if own in nodes and service not in services:
-                self._call("unregisterService", service, self._service_uri)
+                self._call("unregisterService", service, _service_uri(self._uri))
 
-    def _offered(self, kind: Kind, patterns: tuple[str, ...]) -> dict[str, str]:
-        """Return names of ROS 1 with their types on the network."""
+    def _offered(self, kind: Kind, patterns: tuple[NamePattern, ...]) -> dict[str, str]:
+        """Return the types of the entities to register, by their names in ROS 1."""
         shared = self._shared
-        found = {}
+        types = {}
         for token in shared.entities(kind):
             name = shared.there(token.name)
             if token.node_name.startswith(BRIDGE):
                 continue
-            if name is not None and matches(patterns, name):
-                found[name] = token.type_name
-        return found
+            if name is not None and matches_any(patterns, name):
+                types[name] = token.type_name
+        return types
 
     def _call(self, method: str, *args: Any) -> Any:
         return call(self._master, method, (self._shared.name, *args))
 
     def _leave(self) -> None:
-        """Unregister everything."""
-        own = self._shared.name
+        """Unregister everything that the bridge has registered."""
         try:
-            self._unregister_all(own, self._uri, _read_state(self._call("getSystemState")))
+            state = _read_state(self._call("getSystemState"))
+            self._unregister_all(self._shared.name, self._uri, state)
         except RoszError as error:
             log.debug("the master has gone: %s", error)
 
     def _without_ended(self, state: _State) -> _State:
-        """Return a state without bridges of this machine that were killed; unregister them."""
+        """Unregister killed bridges of this machine; return a state without them."""
         host = Address.parse(self._uri).host
         ended = {
             node: uri
             for node, uri in self._ended
-            if _is_bridge(node) and Address.parse(uri).host == host
+            if node.startswith(BRIDGE) and Address.parse(uri).host == host
         }
         for node, uri in ended.items():
             self._unregister_all(node, uri, state)
         return tuple(
             {
-                name: found
-                for name, nodes in known.items()
-                if (found := [*set(nodes) - ended.keys()])
+                name: alive
+                for name, nodes in nodes_by_name.items()
+                if (alive := [*set(nodes) - ended.keys()])
             }
-            for known in state
+            for nodes_by_name in state
         )
 
     def _unregister_all(self, node: str, uri: str, state: _State) -> None:
-        """Unregister everything of a bridge."""
+        """Unregister everything that a bridge has registered."""
         published, _, served = state
         for topic in (name for name, nodes in published.items() if node in nodes):
             call(self._master, "unregisterPublisher", (node, topic, uri))
@@ -378,73 +357,9 @@ class AttachedBridge:
             call(self._master, "unregisterService", (node, service, _service_uri(uri)))
         call(self._master, "unsubscribeParam", (node, uri, "/"))
 
-    # Parameters.
-
-    def _join_params(self) -> None:
-        """Make the parameters of both equal; where they differ, the master's count."""
-        theirs = self._call("subscribeParam", self._uri, "/")
-        params, shared = self._shared.context.params, self._shared
-        known = dict(_flat(theirs if isinstance(theirs, dict) else {}))
-        changes = []
-        for name, value in known.items():
-            if self._crosses(name):
-                path = split(shared.here(name))
-                if params.lookup(path) != value:
-                    changes.append((path, normalise(value, name)))
-        params.write(changes, origin=shared.name)
-        for name in params.names():
-            there = shared.there(name)
-            if there is not None and there not in known and self._crosses(there):
-                self._send(there, params.peek(name))
-
-    def _crosses(self, name: str) -> bool:
-        own = any(name == each or name.startswith(f"{each}/") for each in _OWN_PARAMS)
-        return not own and matches(self._choice.params, name)
-
-    def _send(self, name: str, value: Any) -> None:
-        try:
-            if value is None:
-                self._call("deleteParam", name)
-            else:
-                self._call("setParam", name, value)
-        except EncodeError as error:
-            log.warning("parameter '%s' stays here: %s", name, error)
-        except RoszError as error:
-            log.info("parameter '%s' is not set at the master: %s", name, error)
-
-    def _changed(self, changed: Changed) -> None:
-        """Pass a change on to the master; runs on the thread for watches."""
-        name = self._shared.there(changed.name)
-        if changed.origin != self._shared.name and name is not None and self._crosses(name):
-            self._worker.submit(partial(self._send_if_active, name, changed.new))
-
-    def _send_if_active(self, name: str, value: Any) -> None:
-        if self._active:
-            self._send(name, value)
-
-    def _param_update(self, key: str, value: Any) -> None:
-        """Take a change of the master; runs on a thread of the server."""
-        name = f"/{key.strip('/')}"
-        if not self._active or not self._crosses(name):
-            return
-        params, here = self._shared.context.params, self._shared.here(name)
-        try:
-            if value == {} and not self._call("hasParam", name):
-                params.delete(here, origin=self._shared.name)
-            elif not _same(params.lookup(split(here)), value):  # else it could go round a ring
-                params.set(here, value, origin=self._shared.name)
-        except ParamNotFound:
-            return
-        except RoszError as error:
-            log.warning("parameter '%s' of ROS 1 is not set here: %s", name, error)
-
 
 def _read_state(state: Any) -> _State:
-    """Return the state that a master has told.
-
-    Raises:
-        DecodeError: It is not one.
-    """
+    """Return the result of ``getSystemState`` as dictionaries."""
     return tuple(map(dict, _convert(state, tuple[_Names, _Names, _Names])))
 
 
@@ -456,36 +371,20 @@ def _convert(value: Any, kind: Any) -> Any:
 
 
 def _service_uri(uri: str) -> str:
-    """Return the URI of the services of a bridge, which has one port for all."""
+    """Return the URI for all services of a bridge; they share the port of its XML-RPC server."""
     return uri.replace("http:", "rosrpc:").rstrip("/")
 
 
-def _is_bridge(node: str) -> bool:
-    return node.startswith(BRIDGE)
-
-
-def _flat(tree: dict[str, Any]) -> Iterable[tuple[str, Any]]:
-    return ((f"/{'/'.join(path)}", value) for path, value in leaves(tree) if path)
-
-
-def _same(one: Any, other: Any) -> bool:
-    return type(one) is type(other) and bool(one == other)
-
-
 def _keep(node: str, reason: str) -> None:
-    log.warning("node '%s' of ROS 1 goes on, although asked to end: %s", node, reason)
+    log.warning("node '%s' of ROS 1 keeps running although it was asked to end: %s", node, reason)
 
 
 def _own_address(address: Address) -> str:
-    """Return the address of this machine on the way to another one.
-
-    Raises:
-        TransportError: The host is not known, or cannot be reached.
-    """
+    """Return the address of this machine on the network interface towards another one."""
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.connect((address.host, address.port))
-            found: str = probe.getsockname()[0]
-            return found
+            own_address: str = probe.getsockname()[0]
+            return own_address
     except (OSError, UnicodeError) as error:
         raise TransportError(f"cannot reach {address}: {error}") from error

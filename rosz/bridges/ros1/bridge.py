@@ -1,4 +1,4 @@
-"""rosz as the master of ROS 1's programs."""
+"""A master for ROS 1's programs, with which they take part in the network of rosz."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import threading
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Self
 
 import msgspec
 
@@ -16,19 +15,18 @@ from rosz.bridges.ros1.master import Master
 from rosz.bridges.ros1.mirror import Mirror
 from rosz.bridges.ros1.node_api import NodeApi
 from rosz.bridges.ros1.peers import call
-from rosz.bridges.ros1.registry import Change, Entry
-from rosz.bridges.ros1.server import Server
-from rosz.bridges.ros1.shared import MASTER, MASTER_NODE, Shared
+from rosz.bridges.ros1.registrations import Registrations
+from rosz.bridges.ros1.registry import Change, RegistryEntry
+from rosz.bridges.ros1.server import Ros1Server
+from rosz.bridges.ros1.shared import MASTER, MASTER_NODE, BridgeResources
 from rosz.bridges.ros1.sockets import log
 from rosz.environment import Environment
 from rosz.errors import RoszError, TransportError
-from rosz.lifecycle import Registration
+from rosz.lifecycle import Closing, Registration
 from rosz.node import BridgedNode, Context
 
-__all__ = ("MASTER_PORT", "MasterBridge", "open_master", "running_master")
-
 MASTER_PORT = 11311
-"""Port of ROS 1's master, unless ``ROS_MASTER_URI`` names another one."""
+"""Default port of ROS 1's master."""
 
 _PROBE_TIMEOUT = 2.0
 
@@ -45,7 +43,7 @@ def running_master(environ: Mapping[str, str]) -> str:
 
 
 def open_master(environment: Environment) -> MasterBridge:
-    """Return a master for programs of this machine, at the usual port if that is free.
+    """Return a master for programs of this machine, at the default port if it is free.
 
     Raises:
         TransportError: The session cannot be opened.
@@ -57,8 +55,8 @@ def open_master(environment: Environment) -> MasterBridge:
         return MasterBridge(environment, port=0)
 
 
-class MasterBridge:
-    """A master of ROS 1, whose nodes take part in the network of rosz.
+class MasterBridge(Closing):
+    """A master of ROS 1; its nodes take part in the network of rosz.
 
     Args:
         environment: Settings; those of the process when not given.
@@ -66,10 +64,10 @@ class MasterBridge:
         port: Port to listen at; 0 for any.
 
     Attributes:
-        port: Port that it listens at.
+        port: Port at which the master listens.
 
     Raises:
-        TransportError: It cannot listen there, or the session cannot be opened.
+        TransportError: It cannot listen at the port, or the session cannot be opened.
         UsageError: A variable of the environment has an invalid value.
     """
 
@@ -81,7 +79,7 @@ class MasterBridge:
     ) -> None:
         environment = environment or Environment.read()
         context = Context(environment)
-        self._shared = shared = Shared(context, "", is_master=True)
+        self._shared = shared = BridgeResources(context, is_master=True)
         self._lifecycle = shared.lifecycle
         self._lifecycle.keep(context)
         self._lifecycle.keep(Registration(shared.close))
@@ -93,38 +91,33 @@ class MasterBridge:
 
     def _open(self, environment: Environment, host: str, port: int) -> None:
         shared = self._shared
-        server = Server(shared.loop, host, port)
+        server = Ros1Server(shared.loop, host, port)
         self._lifecycle.keep(server)
         self.port: int = server.port
         machine = re.sub(r"\W", "_", socket.gethostname(), flags=re.ASCII)
         shared.name = f"{MASTER_NODE}{machine}_{self.port}"
         api = NodeApi(shared, self.port)
-        self._master = Master(shared, self.port, self._on_changes, api.answer)
+        self._registrations = Registrations(shared, self.port, self._on_changes)
+        master = Master(shared, self._registrations, api.answer)
         self._own = BridgedNode(shared.context, shared.name, lambda _reason: None)
         self._lifecycle.keep(self._own)
         self._mirror = api.mirror = Mirror(
-            shared, self._own, self._master.terminate, self._master.notify
+            shared, self._own, self._registrations.terminate, self._registrations.notify
         )
         self._lifecycle.keep(self._mirror)
         self._file = environment.home / "rosz" / f"ros1_master_{self.port}.json"
         self._saving = False
-        server.start(self._master.dispatch, self._mirror.accept)
+        server.start(master.dispatch, self._mirror.accept)
         self._restore()
-        shared.prober.start(self._master.nodes, self._on_probe)
+        shared.prober.start(self._registrations.nodes, self._on_probe)
 
     def nodes(self) -> dict[str, str]:
         """Return the URIs of the nodes that are registered, by name."""
-        return self._master.nodes()
+        return self._registrations.nodes()
 
     def close(self) -> None:
-        """End the master; a second call has no effect."""
+        """Close the master; a second call has no effect."""
         self._lifecycle.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def _on_changes(self, changes: list[Change]) -> None:
         self._mirror.apply(changes)
@@ -133,40 +126,38 @@ class MasterBridge:
             self._shared.changes.submit(self._save)
 
     def _on_probe(self, node: str, uri: str, is_there: bool) -> None:
-        if not is_there and self._master.drop(node, uri):
+        if not is_there and self._registrations.drop(node, uri):
             log.info("node '%s' of ROS 1 has ended", node)
 
-    # Registrations outlive the master.
+    # Registrations are stored, so that a master that is restarted knows the nodes.
 
     def _save(self) -> None:
         self._saving = False
-        entries = self._master.entries()
+        entries = self._registrations.entries()
         new = self._file.with_suffix(".new")
         try:
             self._file.parent.mkdir(parents=True, exist_ok=True)
             new.write_bytes(msgspec.json.encode(entries))
             new.replace(self._file)
         except OSError as error:
-            log.warning(
-                "cannot keep ROS 1's registrations for a restart in %s: %s", self._file, error
-            )
+            log.warning("cannot save ROS 1's registrations in %s: %s", self._file, error)
 
     def _restore(self) -> None:
-        """Register the nodes of the last master of this port that are still alive."""
+        """Register the nodes that the last master at this port stored and that still answer."""
         entries = _read(self._file)
         waiting = {(entry.node, entry.uri) for entry in entries}
         alive: set[tuple[str, str]] = set()
         lock = threading.Lock()
 
         def check(node: str, uri: str) -> None:
-            found = _answers(node, uri)
+            is_alive = _answers(node, uri)
             with lock:
                 waiting.discard((node, uri))
-                if found:
+                if is_alive:
                     alive.add((node, uri))
-                last = not waiting
-            if last:
-                self._master.restore([e for e in entries if (e.node, e.uri) in alive])
+                is_last = not waiting
+            if is_last:
+                self._registrations.restore([e for e in entries if (e.node, e.uri) in alive])
 
         for node, uri in list(waiting):
             self._shared.requests.submit(partial(check, node, uri))
@@ -181,9 +172,9 @@ def _answers(node: str, uri: str) -> bool:
     return True
 
 
-def _read(file: Path) -> list[Entry]:
+def _read(file: Path) -> list[RegistryEntry]:
     try:
-        return msgspec.json.decode(file.read_bytes(), type=list[Entry])
+        return msgspec.json.decode(file.read_bytes(), type=list[RegistryEntry])
     except FileNotFoundError:
         return []
     except (OSError, msgspec.MsgspecError) as error:

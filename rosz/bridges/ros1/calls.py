@@ -1,6 +1,6 @@
 """XML-RPC over HTTP as bytes: calls between ROS 1's master, its nodes and this bridge.
 
-Only what ROS 1's programs send is understood: POST with a Content-length. Documents with a type
+Only requests of ROS 1's programs are understood: POST with a Content-length. Documents with a type
 declaration are refused, because entities can make small documents huge; so is deep nesting.
 """
 
@@ -14,18 +14,6 @@ from xml.parsers import expat
 import msgspec
 
 from rosz.errors import DecodeError, EncodeError
-
-__all__ = (
-    "MAX_BODY",
-    "MAX_HEAD",
-    "Call",
-    "CallReader",
-    "decode_result",
-    "encode_call",
-    "encode_fault",
-    "encode_refusal",
-    "encode_result",
-)
 
 MAX_HEAD = 16 << 10
 """Largest size of the head of an HTTP request in bytes."""
@@ -49,16 +37,13 @@ _FOREIGN = (
     ValueError,
     AttributeError,
 )
-"""What the standard library raises for documents that are not XML-RPC."""
+"""Errors of the standard library for documents that are not XML-RPC."""
 
 
-class Call(msgspec.Struct, frozen=True):
+class RpcCall(msgspec.Struct, frozen=True):
     """A call that was received.
 
     Attributes:
-        path: Path of the URI that was called.
-        method: Name of the method.
-        args: Arguments.
         keep_alive: Whether the caller keeps the connection for further calls.
         size: Size of its document in bytes.
     """
@@ -87,7 +72,7 @@ class CallReader:
         """Number of bytes that have been received of the next call."""
         return len(self._data)
 
-    def feed(self, data: bytes | memoryview) -> Iterator[Call]:
+    def feed(self, data: bytes | memoryview) -> Iterator[RpcCall]:
         """Yield the calls that are complete with more bytes of the stream.
 
         Raises:
@@ -112,7 +97,7 @@ class CallReader:
             args, method = _loads(body, _CALL)
             if method is None:
                 raise DecodeError(_CALL, -1, "no methodName")
-            yield Call(path, method, args, keep_alive, size)
+            yield RpcCall(path, method, args, keep_alive, size)
 
 
 def _read_head(head: bytes) -> tuple[str, int, bool]:
@@ -224,7 +209,7 @@ def encode_fault(text: str, *, keep_alive: bool = True) -> bytes:
 
 
 def encode_refusal(text: str) -> bytes:
-    """Return the response to what is not a call; the connection is closed after it."""
+    """Return the response to a request that is not a call; the connection is closed after it."""
     body = f"{text}\n".encode()
     head = f"HTTP/1.1 400 Bad Request\r\nContent-type: text/plain\r\nContent-length: {len(body)}"
     return f"{head}\r\nConnection: close\r\n\r\n".encode() + body

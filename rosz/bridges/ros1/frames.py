@@ -1,7 +1,7 @@
-"""TCPROS as bytes: frames with a length before them, and connection headers (ROS wiki, TCPROS).
+"""The bytes of TCPROS: frames that begin with a length, and connection headers (ROS wiki, TCPROS).
 
-Numbers are little-endian. A header is a frame of fields, each a length and ``name=value``. Nothing
-is allocated for a length before that many bytes have arrived.
+Numbers are little-endian. A header is a frame of fields; each field is a length and ``name=value``.
+Memory grows only with the bytes that have arrived, whatever length a frame announces.
 """
 
 from __future__ import annotations
@@ -11,13 +11,11 @@ from struct import Struct
 
 from rosz.errors import DecodeError
 
-__all__ = ("MAX_FRAME", "MAX_HEADER", "FrameReader", "decode_header", "encode_header", "frame")
-
 MAX_HEADER = 4 << 20
-"""Largest size of a header in bytes; it holds the text of the definition of a message."""
+"""Largest size of a header in bytes; a header includes the text of a message definition."""
 
 MAX_FRAME = 1 << 30
-"""Largest size of a message in bytes; roscpp refuses larger ones, too."""
+"""Largest size of a message in bytes, as in roscpp."""
 
 _HEADER = "TCPROS header"
 _FRAME = "TCPROS frame"
@@ -27,7 +25,7 @@ _MAX_FIELDS = 1000
 
 
 def frame(data: bytes) -> bytes:
-    """Return bytes with their length before them."""
+    """Return a frame: the length of some bytes, then the bytes."""
     return _LENGTH.pack(len(data)) + data
 
 
@@ -43,7 +41,7 @@ def decode_header(data: bytes | memoryview) -> dict[str, str]:
     may have comments in other encodings.
 
     Args:
-        data: The header without the length before it.
+        data: The header without the length of its frame.
 
     Raises:
         DecodeError: The bytes are not a header.
@@ -71,16 +69,13 @@ def decode_header(data: bytes | memoryview) -> dict[str, str]:
 
 
 class FrameReader:
-    """Cuts a stream into frames.
+    """Splits a stream into frames.
 
-    Received bytes go into `space`; `take` then yields the complete frames among them. The storage
+    The caller writes received bytes to `space`; `take` then yields the complete frames. The storage
     grows as bytes arrive, at most to twice their number.
 
-    Args:
-        limit: Largest frame in bytes.
-
     Attributes:
-        limit: Largest frame in bytes; may be changed between frames.
+        limit: Largest size of a frame in bytes; may be changed between frames.
     """
 
     def __init__(self, limit: int = MAX_HEADER) -> None:
@@ -90,18 +85,18 @@ class FrameReader:
         self._end = 0
 
     def space(self) -> memoryview:
-        """Return where the next bytes of the stream belong; never empty."""
+        """Return the memory for the next bytes of the stream; it is never empty."""
         if self._end == len(self._storage):
             self._make_space()
         return memoryview(self._storage)[self._end :]
 
     def take(self, count: int) -> Iterator[memoryview]:
-        """Yield the frames that are complete with more bytes of the stream.
+        """Add bytes of the stream, and yield the frames that are now complete.
 
-        A frame is only valid until the next one is asked for.
+        Each frame is valid only until the next one is requested.
 
         Args:
-            count: Number of bytes that were put into `space`.
+            count: Number of bytes that were written to `space`.
 
         Raises:
             DecodeError: A frame is larger than the limit.
@@ -123,16 +118,16 @@ class FrameReader:
 
     @property
     def pending(self) -> int:
-        """Number of bytes that have been received of the next frame, its length included."""
+        """Number of bytes of the next frame that have arrived, including its length."""
         return self._end - self._begin
 
     @property
     def size(self) -> int:
-        """Number of bytes that its storage takes."""
+        """Size of the storage in bytes."""
         return len(self._storage)
 
     def _make_space(self) -> None:
-        """Move what is left to the beginning of a storage with space."""
+        """Move the remaining bytes to the beginning of a new storage that has space."""
         left = self._end - self._begin
         size = len(self._storage) if left <= len(self._storage) // 2 else 2 * left
         storage = bytearray(max(size, _PIECE))

@@ -8,15 +8,15 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
-from rosz.bridges.ros1.actions import Actions
+from rosz.bridges.ros1.actions import ActionGateways
 from rosz.bridges.ros1.frames import encode_header
 from rosz.bridges.ros1.published import PublishedTopic
-from rosz.bridges.ros1.registry import ANY_TYPE, Change, Entry, Role
+from rosz.bridges.ros1.registry import ANY_TYPE, Change, RegistryEntry, Role
 from rosz.bridges.ros1.server import Incoming
 from rosz.bridges.ros1.services import Clients, ProvidedService, ServiceConnection
-from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, Connection, Shared
+from rosz.bridges.ros1.shared import BRIDGE, MASTER_NODE, BridgeResources, TopicConnection
 from rosz.bridges.ros1.sockets import log
 from rosz.bridges.ros1.subscribed import SubscribedTopic
 from rosz.errors import ClosedError, InvalidName, RoszError, ServiceError, UsageError
@@ -25,8 +25,6 @@ from rosz.node import BridgedNode
 from rosz.wire import Kind, Token
 from rosz.worker import Worker
 
-__all__ = ("Mirror",)
-
 _CALLS = 64
 _MAX_CALLS = 1000
 _CLOSE_TIMEOUT = 10.0
@@ -34,19 +32,10 @@ _RETRY_SECONDS = 0.3
 _MOST_TRIES = 10
 
 
-class _Part(Protocol):
-    """A registration on the network."""
+_MirroredPart = PublishedTopic | SubscribedTopic | ProvidedService
+"""A registration on the network."""
 
-    entry: Entry
-
-    def update(self) -> None:
-        """Adapt to what else there is."""
-
-    def close(self) -> None:
-        """Take it from the network."""
-
-
-_PARTS: dict[Role, Callable[[Shared, BridgedNode, Entry], _Part]] = {
+_PARTS: dict[Role, Callable[[BridgeResources, BridgedNode, RegistryEntry], _MirroredPart]] = {
     "publisher": PublishedTopic,
     "subscriber": SubscribedTopic,
     "service": ProvidedService,
@@ -57,8 +46,6 @@ class Mirror:
     """Shows ROS 1's nodes to the network.
 
     Args:
-        shared: What the bridge shares.
-        own: The bridge's own node.
         terminate: Function that asks a node of ROS 1 to end: its name and the reason.
         published: Function called with a topic whose publishers on the network have changed.
         look: Function called when a subscriber connects that is not known yet, but may be soon.
@@ -66,7 +53,7 @@ class Mirror:
 
     def __init__(
         self,
-        shared: Shared,
+        shared: BridgeResources,
         own: BridgedNode,
         terminate: Callable[[str, str], object],
         published: Callable[[str], object],
@@ -78,17 +65,19 @@ class Mirror:
         self._published = published
         self._own = own
         self._clients = Clients(own, shared)
-        self._actions = Actions(shared)
+        self._actions = ActionGateways(shared)
         self._calls: Worker[Callable[[], object]] = Worker(
             "rosz-ros1-services", threads=_CALLS, capacity=_MAX_CALLS, logger=log
         )
-        self._parts: dict[tuple[Role, str, str], _Part] = {}
-        self._by_name: dict[str, list[_Part]] = {}
+        self._parts: dict[tuple[Role, str, str], _MirroredPart] = {}
+        self._by_name: dict[str, list[_MirroredPart]] = {}
         self._nodes: dict[str, BridgedNode] = {}
         self._lock = threading.Lock()
         self._changed: dict[str, bool] = {}
         shared.lifecycle.keep(
-            Registration(shared.context.graph.listen(self._on_token))  # ends before what it uses
+            Registration(
+                shared.context.graph.listen(self._on_token)
+            )  # ends before the workers that it uses
         )
 
     def apply(self, changes: list[Change]) -> None:
@@ -99,7 +88,7 @@ class Mirror:
         """Take a connection of a program of ROS 1; any thread may call it."""
         self._shared.changes.submit(partial(self._accept, incoming, header))
 
-    def connections(self, topic: str) -> list[Connection]:
+    def connections(self, topic: str) -> list[TopicConnection]:
         """Return the connections to nodes of ROS 1 for a topic of the network."""
         return [
             connection
@@ -140,7 +129,7 @@ class Mirror:
                     error,
                 )
 
-    def _add(self, entry: Entry) -> None:
+    def _add(self, entry: RegistryEntry) -> None:
         make = _PARTS.get(entry.role)
         if make is None:
             return
@@ -158,13 +147,13 @@ class Mirror:
             self._nodes[entry.node] = node
         self._keep(make(self._shared, node, entry))
 
-    def _keep(self, part: _Part) -> _Part:
+    def _keep(self, part: _MirroredPart) -> _MirroredPart:
         entry = part.entry
         self._parts[entry.role, entry.name, entry.node] = part
         self._by_name.setdefault(self._shared.here(entry.name), []).append(part)
         return part
 
-    def _remove(self, entry: Entry) -> None:
+    def _remove(self, entry: RegistryEntry) -> None:
         part = self._parts.pop((entry.role, entry.name, entry.node), None)
         if part is not None:
             name = self._shared.here(entry.name)
@@ -193,7 +182,7 @@ class Mirror:
             self._shared.changes.submit(self._update)
 
     def _update(self) -> None:
-        """Adapt to what has changed on the network."""
+        """Adapt to changes of the network."""
         with self._lock:
             changed, self._changed = self._changed, {}
         for name, is_published in changed.items():
@@ -236,7 +225,7 @@ class Mirror:
         part: Any = self._parts.get(("subscriber", topic, node))
         if part is None and node.startswith(MASTER_NODE):
             # A master of another network, for the nodes of which it registers nothing.
-            entry = Entry("subscriber", topic, node, "", ANY_TYPE)
+            entry = RegistryEntry("subscriber", topic, node, "", ANY_TYPE)
             part = self._keep(SubscribedTopic(self._shared, self._own, entry))
         connecting = self._find_connecting(node, waited)
         if connecting is not None:
@@ -257,13 +246,9 @@ class Mirror:
     ) -> PublishedTopic | None:
         """Return a topic that a node publishes, to which the bridge still connects.
 
-        What a node publishes in answer to its first message, as servers of actions do, would be
+        The answers of a node to its first message, such as those of an action server, would be
         lost before that: roscpp keeps nothing for subscribers that are not connected. Bridges do
         not wait for bridges, as both would wait.
-
-        Args:
-            node: Name of the node.
-            waited: Topics that have been waited for; none is twice.
         """
         if node.startswith((MASTER_NODE, BRIDGE)):
             return None

@@ -1,69 +1,62 @@
-"""The Slave API of ROS 1 (ROS wiki), for the nodes of the network and for the bridge itself."""
+"""The Slave API of ROS 1 (ROS wiki), served for nodes of the network and the bridge itself."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from rosz.bridges.ros1.calls import Call
+from rosz.bridges.ros1.calls import RpcCall
+from rosz.bridges.ros1.master import Answer
 from rosz.bridges.ros1.mirror import Mirror
-from rosz.bridges.ros1.shared import Shared
+from rosz.bridges.ros1.shared import BridgeResources, TopicConnection
 from rosz.bridges.ros1.sockets import Stream
 from rosz.errors import RoszError, ServiceError
-from rosz.introspect.nodes import kill
+from rosz.introspect import kill
 from rosz.names import ros1_type
 from rosz.wire import Kind, Token
 
-__all__ = ("NodeApi",)
-
-Answer = tuple[int, str, Any]
 _REASON = "requested by a program of ROS 1"
 
 
 class NodeApi:
-    """Answers what ROS 1's programs ask a node.
+    """Answers calls of ROS 1's programs to nodes of the network.
 
     Args:
-        shared: What the bridge shares.
         port: Port of the bridge.
-        param_update: Function called with a parameter that a master says has changed, and its
-            value.
+        param_update: Function called with the name and the value of a parameter that has changed,
+            according to a master.
 
     Attributes:
-        mirror: What knows the connections; None until there is one.
+        mirror: The mirror, which knows the connections; set before the first call.
     """
 
     def __init__(
         self,
-        shared: Shared,
+        shared: BridgeResources,
         port: int,
         param_update: Callable[[str, Any], object] | None = None,
     ) -> None:
         self._on_param = param_update
         self._shared = shared
         self._port = port
-        self.mirror: Mirror | None = None
+        self.mirror: Mirror
         self._methods: dict[str, Callable[..., Answer]] = {
             "getBusInfo": self._get_bus_info,
             "getBusStats": self._get_bus_stats,
             "getMasterUri": self._get_master_uri,
             "getPid": self._get_pid,
-            "getPublications": self._get_publications,
-            "getSubscriptions": self._get_subscriptions,
+            "getPublications": partial(self._get_topics, "publications", Kind.PUBLISHER),
+            "getSubscriptions": partial(self._get_topics, "subscriptions", Kind.SUBSCRIPTION),
             "paramUpdate": self._param_update,
-            "publisherUpdate": self._accept,
+            "publisherUpdate": lambda *_: (1, "", 0),
             "requestTopic": self._request_topic,
             "shutdown": self._shut_down,
         }
 
-    def answer(self, node: str, call: Call, stream: Stream) -> Any:
-        """Return the result of a call.
-
-        Args:
-            node: Name of the node of the network; empty for the bridge.
-            call: The call.
-            stream: The connection that it came on.
+    def answer(self, node: str, call: RpcCall, stream: Stream) -> Any:
+        """Return the result of a call to a node; the name is empty for the bridge itself.
 
         Raises:
             ServiceError: The method does not exist.
@@ -87,31 +80,25 @@ class NodeApi:
     def _get_master_uri(self, _node: str, stream: Stream, *_args: Any) -> Answer:
         return 1, "", f"http://{stream.local_host}:{self._port}/"
 
-    def _get_publications(self, node: str, _: Stream, *_args: Any) -> Answer:
-        return 1, "publications", self._topics(node, Kind.PUBLISHER)
-
-    def _get_subscriptions(self, node: str, _: Stream, *_args: Any) -> Answer:
-        return 1, "subscriptions", self._topics(node, Kind.SUBSCRIPTION)
-
-    def _topics(self, node: str, kind: Kind) -> list[list[str]]:
-        found = {t.name: ros1_type(t.name, t.type_name) for t in self._tokens(node, kind)}
-        return [[name, kind] for name, kind in found.items()]
+    def _get_topics(self, text: str, kind: Kind, node: str, _: Stream, *_args: Any) -> Answer:
+        types = {t.name: ros1_type(t.name, t.type_name) for t in self._tokens(node, kind)}
+        return 1, text, [[name, type_name] for name, type_name in types.items()]
 
     def _get_bus_stats(self, node: str, _: Stream, *_args: Any) -> Answer:
-        """Tell the traffic of connections to ROS 1; what is counted is that of a connection."""
+        """Return the traffic of each connection to ROS 1."""
         published: list[list[Any]] = []
         subscribed: list[list[Any]] = []
         for token in self._tokens(node, Kind.PUBLISHER, Kind.SUBSCRIPTION):
             outward = token.kind is Kind.PUBLISHER
-            known = self.mirror.connections(token.name) if self.mirror is not None else []
-            found = [one for one in known if one.publishes != outward]
-            numbered = list(enumerate(found, 1))
+            connections = self._connections(token)
+            rows = [
+                [number, connection.bytes, connection.messages if outward else -1, True]
+                for number, connection in enumerate(connections, 1)
+            ]
             if outward:
-                total = sum(one.bytes for one in found)
-                rows = [[number, one.bytes, one.messages, True] for number, one in numbered]
+                total = sum(connection.bytes for connection in connections)
                 published.append([token.name, total, rows])
             else:
-                rows = [[number, one.bytes, -1, True] for number, one in numbered]
                 subscribed.append([token.name, rows])
         return 1, "bus stats", [published, subscribed, []]
 
@@ -124,39 +111,35 @@ class NodeApi:
         return 1, "bus info", info
 
     def _others(self, token: Token) -> list[str]:
-        """Return the nodes on both sides that an entity is connected to."""
+        """Return the nodes of ROS 1 and of the network to which an entity is connected."""
         outward = token.kind is Kind.PUBLISHER
         kind = Kind.SUBSCRIPTION if outward else Kind.PUBLISHER
-        found = [
+        nodes = [
             other.node_name
             for other in self._shared.entities(kind, name=token.name)
             if other.type_name == token.type_name
         ]
-        if self.mirror is not None:
-            found += [
-                connection.node
-                for connection in self.mirror.connections(token.name)
-                if connection.publishes != outward
-            ]
-        return found
+        return nodes + [connection.node for connection in self._connections(token)]
+
+    def _connections(self, token: Token) -> list[TopicConnection]:
+        """Return the connections of an entity to nodes of ROS 1."""
+        connections = self.mirror.connections(token.name)
+        return [c for c in connections if c.publishes != (token.kind is Kind.PUBLISHER)]
 
     def _param_update(self, _node: str, _: Stream, *args: Any) -> Answer:
         if len(args) == 2 and isinstance(args[0], str) and self._on_param is not None:  # noqa: PLR2004  # name and value
             self._on_param(args[0], args[1])
         return 1, "", 0
 
-    def _accept(self, _node: str, _: Stream, *_args: Any) -> Answer:
-        return 1, "", 0
-
     def _request_topic(self, _node: str, stream: Stream, *_args: Any) -> Answer:
-        # Who publishes is looked at when it connects: a program that is refused here does not try
-        # again, even if it is told meanwhile that there is a publisher.
+        # Whether the node publishes the topic is checked when the program connects: a program that
+        # is refused here does not try again, even after an update about publishers.
         return 1, "ready", ["TCPROS", stream.local_host, self._port]
 
     def _shut_down(self, node: str, _: Stream, *args: Any) -> Answer:
         tokens = self._tokens(node, Kind.NODE) or self._tokens(node)
         if not tokens:
-            return -1, f"node [{node}] is not to be shut down by programs of ROS 1", 0
+            return -1, f"programs of ROS 1 cannot shut down node [{node}]", 0
         reason = str(args[0])[:200] if args and args[0] else _REASON
         try:
             kill(self._shared.context.session, tokens[0], reason)

@@ -1,4 +1,4 @@
-"""Calls of ROS 1's nodes and masters, and connections to them."""
+"""Calls of ROS 1's nodes and masters, connections to them, and whether they still listen."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import http.client
 import socket
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -14,20 +15,13 @@ import msgspec
 from rosz.bridges.ros1.calls import MAX_BODY, decode_result, encode_call
 from rosz.bridges.ros1.frames import MAX_HEADER, decode_header, encode_header
 from rosz.errors import DecodeError, ServiceError, TransportError
-
-__all__ = (
-    "TIMEOUT",
-    "Address",
-    "call",
-    "connect",
-    "exchange_headers",
-    "is_listening",
-    "multicall",
-    "receive",
-)
+from rosz.worker import Worker
 
 TIMEOUT = 5.0
 """Seconds that another program gets for a connection, and for an answer."""
+
+_PROBE_SECONDS = 3.0
+_PROBE_TIMEOUT = 2.0
 
 _SUCCESS = 1
 _LENGTH = 4
@@ -79,11 +73,30 @@ def connect(address: Address, timeout: float = TIMEOUT) -> socket.socket:
         raise TransportError(f"cannot connect to {address}: {_reason(error)}") from error
 
 
-def is_listening(uri: str, timeout: float = TIMEOUT) -> bool:
+def connect_either(address: Address, uri: str) -> socket.socket:
+    """Return a socket that is connected to an address of a node, or to its port at another host.
+
+    Args:
+        address: Address that the node names, which may be wrong beyond its machine.
+        uri: URI of the node, whose host is the other one.
+
+    Raises:
+        TransportError: Nobody listens at either, or neither host is known.
+    """
+    try:
+        return connect(address)
+    except TransportError:
+        registered = Address.parse(uri)
+        if registered.host == address.host:
+            raise
+        return connect(Address(registered.host, address.port))
+
+
+def is_listening(uri: str) -> bool:
     """Return whether a program listens at a URI, or its machine is too slow to tell."""
     address = Address.parse(uri)
     try:
-        socket.create_connection((address.host, address.port), timeout).close()
+        socket.create_connection((address.host, address.port), _PROBE_TIMEOUT).close()
     except TimeoutError:
         return True
     except (OSError, UnicodeError):
@@ -92,10 +105,7 @@ def is_listening(uri: str, timeout: float = TIMEOUT) -> bool:
 
 
 def _request(
-    uri: str,
-    method: str,
-    args: tuple[Any, ...] | Callable[[str], tuple[Any, ...]],
-    timeout: float,
+    uri: str, method: str, args: tuple[Any, ...] | Callable[[str], tuple[Any, ...]], timeout: float
 ) -> Any:
     """Call a method of a program by XML-RPC, and return the result; errors as those of `call`."""
     address = Address.parse(uri)
@@ -146,10 +156,8 @@ def call(
     return value
 
 
-def multicall(
-    uri: str, calls: list[tuple[str, tuple[Any, ...]]], timeout: float = TIMEOUT
-) -> list[Any]:
-    """Call several methods of a master at once, and return their values; None for what failed.
+def multicall(uri: str, calls: list[tuple[str, tuple[Any, ...]]]) -> list[Any]:
+    """Call several methods of a master at once, and return their values; None for failed ones.
 
     Raises:
         TransportError: The master cannot be reached, or does not answer in time.
@@ -158,7 +166,7 @@ def multicall(
     if not calls:
         return []
     many = [{"methodName": method, "params": list(args)} for method, args in calls]
-    results = _request(uri, "system.multicall", (many,), timeout)
+    results = _request(uri, "system.multicall", (many,), TIMEOUT)
     if not isinstance(results, list) or len(results) != len(calls):
         raise DecodeError("XML-RPC result", -1, f"expected a list of {len(calls)} results")
     return [_value(result) for result in results]
@@ -214,3 +222,46 @@ def _reason(error: Exception) -> str:
     if isinstance(error, TimeoutError):
         return "it does not answer in time"
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+class Prober:
+    """Checks every three seconds, and on request, whether nodes listen: killed ones do not say."""
+
+    def __init__(
+        self, requests: Worker[Callable[[], object]], timer: Worker[Callable[[], object]]
+    ) -> None:
+        self._requests = requests
+        self._timer = timer
+        self._nodes: Callable[[], dict[str, str]] = dict
+        self._probed: Callable[[str, str, bool], object] = lambda *_: None
+        self._checking: set[tuple[str, str]] = set()
+
+    def start(
+        self, nodes: Callable[[], dict[str, str]], probed: Callable[[str, str, bool], object]
+    ) -> None:
+        """Look at the nodes from now on.
+
+        Args:
+            nodes: Function that returns the URIs of the nodes by name.
+            probed: Function called with a node, its URI and whether it listens there, on a thread
+                for requests.
+        """
+        self._nodes, self._probed = nodes, probed
+        self._timer.later(_PROBE_SECONDS, self._look)
+
+    def check(self, node: str, uri: str) -> None:
+        """Look at a node soon, as it may have ended; any thread may call it."""
+        if (node, uri) not in self._checking:
+            self._checking.add((node, uri))
+            self._requests.submit(partial(self._check, node, uri))
+
+    def _look(self) -> None:
+        for node, uri in self._nodes().items():
+            self.check(node, uri)
+        self._timer.later(_PROBE_SECONDS, self._look)
+
+    def _check(self, node: str, uri: str) -> None:
+        try:
+            self._probed(node, uri, is_listening(uri))
+        finally:
+            self._checking.discard((node, uri))

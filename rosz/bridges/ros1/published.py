@@ -1,8 +1,8 @@
-"""Topics that ROS 1's nodes publish, on the network.
+"""Publishers on the network for the topics that ROS 1's nodes publish.
 
-A publisher of ROS 1 is a publisher on the network at once, so that others see it. The bridge
-connects to it when the network has a subscription, and disconnects with the last. All of this runs
-on the thread for changes, but for the bytes of messages.
+Each publisher of ROS 1 is declared on the network at once, so that others see it. The bridge
+connects to the node while the network has a subscription. Messages are received on the thread of
+the socket loop; everything else runs on the thread for changes, unless a docstring says otherwise.
 """
 
 from __future__ import annotations
@@ -14,32 +14,24 @@ from typing import Any
 
 from rosz.bridges.ros1.codec import Codec
 from rosz.bridges.ros1.frames import MAX_FRAME, FrameReader
-from rosz.bridges.ros1.peers import Address, call, connect, exchange_headers
-from rosz.bridges.ros1.registry import ANY_TYPE, Entry
-from rosz.bridges.ros1.shared import BRIDGE, QUEUE, Connection, Shared
-from rosz.bridges.ros1.sockets import Stream, log
+from rosz.bridges.ros1.peers import Address, call, connect_either, exchange_headers
+from rosz.bridges.ros1.registry import ANY_TYPE, RegistryEntry
+from rosz.bridges.ros1.shared import BRIDGE, QUEUE, BridgeResources, TopicConnection
+from rosz.bridges.ros1.sockets import Handler, Stream, log
 from rosz.errors import ClosedError, DecodeError, MessageError, RoszError, TypeNotFound
 from rosz.node import BridgedNode, Publisher
 from rosz.qos import QoS, for_queue
 from rosz.wire import Kind
-
-__all__ = ("PublishedTopic",)
 
 _LATCHED = QoS(depth=1, durability="transient_local")
 _FIRST_RETRY = 0.1
 _LAST_RETRY = 2.0
 
 
-class PublishedTopic:
-    """A topic that a node of ROS 1 publishes.
+class PublishedTopic(Handler):
+    """A topic that a node of ROS 1 publishes."""
 
-    Args:
-        shared: What the bridge shares.
-        node: The node.
-        entry: Its registration.
-    """
-
-    def __init__(self, shared: Shared, node: BridgedNode, entry: Entry) -> None:
+    def __init__(self, shared: BridgeResources, node: BridgedNode, entry: RegistryEntry) -> None:
         self.entry = entry
         self._topic = shared.here(entry.name)
         self._shared = shared
@@ -58,32 +50,34 @@ class PublishedTopic:
         try:
             self._codec = shared.codecs.of_ros1(entry.name, entry.type_name)
         except RoszError:
-            pass  # the publisher tells its definition when it is connected
+            pass  # the connection header of the publisher has the definition
         else:
             self._declare(latched=False)
         self.update()
 
-    def connections(self) -> list[Connection]:
-        """Return the connection to the node, if there is one."""
+    def connections(self) -> list[TopicConnection]:
+        """Return a list with the connection to the node; empty if there is none."""
         stream = self._stream
         if stream is None:
             return []
-        return [Connection(self.entry.node, True, stream.received_bytes, self._received)]
+        return [TopicConnection(self.entry.node, True, stream.received_bytes, self._received)]
 
     @property
     def is_connecting(self) -> bool:
-        """Whether a connection was requested that the node has neither accepted nor refused."""
+        """Whether the node has neither accepted nor refused a requested connection."""
         return self._connecting and not self._reported
 
     def when_connected(self, task: Callable[[], object]) -> None:
-        """Run a task on the thread for changes when the node has accepted, refused or ended."""
+        """Run a task on the thread for changes once the connection attempt has ended."""
         self._when_connected.append(task)
 
     def update(self) -> None:
-        """Connect to the node if the network wants its messages, or else disconnect."""
+        """Connect to the node if the network has a subscription; otherwise disconnect."""
         if self._closed:
             return
-        wanted = self._codec is None or bool(self._shared.subscriptions(self._topic))
+        wanted = self._codec is None or bool(
+            self._shared.entities(Kind.SUBSCRIPTION, name=self._topic)
+        )
         if wanted and self._stream is None and not self._connecting:
             self._connecting = True
             if not self._shared.requests.offer(self._connect):
@@ -91,11 +85,11 @@ class PublishedTopic:
         elif not wanted and self._stream is not None:
             self._disconnect()
             if self._publisher is not None and self._publisher.qos.latched:
-                # The node sends its last message again, to whoever is there then.
+                # Drop the stored message: the node sends it again at the next connection.
                 self._declare(latched=True)
 
     def close(self) -> None:
-        """Take the topic from the network."""
+        """Remove the topic from the network."""
         self._closed = True
         self._end_connecting()
         self._disconnect()
@@ -103,7 +97,7 @@ class PublishedTopic:
 
     def _declare(self, *, latched: bool) -> None:
         codec = self._codec
-        assert codec is not None  # noqa: S101  # the callers know it
+        assert codec is not None  # noqa: S101  # the callers have checked it
         self._undeclare()
         qos = codec.qos or (_LATCHED if latched else for_queue(QUEUE))
         try:
@@ -133,14 +127,16 @@ class PublishedTopic:
             self._shared.loop.call(stream.close)
 
     def _connect(self) -> None:
-        """Connect to the node; runs on a thread for requests."""
+        """Connect to the node. This runs on a thread for requests."""
         shared, entry = self._shared, self.entry
         caller = self._caller()
         try:
             answer = call(entry.uri, "requestTopic", (caller, entry.name, [["TCPROS"]]))
-            if not isinstance(answer, list) or answer[:1] != ["TCPROS"] or len(answer) < 3:  # noqa: PLR2004
-                raise DecodeError("XML-RPC result", -1, f"{answer!r:.80}, expected TCPROS")
-            sock = _connect_either(answer, entry.uri)
+            match answer:
+                case ["TCPROS", host, int(port), *_]:
+                    sock = connect_either(Address(str(host), port), entry.uri)
+                case _:
+                    raise DecodeError("XML-RPC result", -1, f"{answer!r:.80}, expected TCPROS")
         except RoszError as error:
             shared.changes.submit(partial(self._failed, str(error)))
             return
@@ -148,7 +144,7 @@ class PublishedTopic:
             "callerid": caller,
             "topic": entry.name,
             "type": entry.type_name,
-            "md5sum": ANY_TYPE,  # the answer has the definition, if it is not the one known here
+            "md5sum": ANY_TYPE,  # any; the answer has the definition if it differs from ours
             "tcp_nodelay": "1",
         }
         try:
@@ -158,18 +154,18 @@ class PublishedTopic:
             shared.changes.submit(partial(self._failed, str(error)))
             return
         if not shared.changes.offer(partial(self._connected, sock, header, caller)):
-            sock.close()  # the bridge has ended meanwhile
+            sock.close()  # the bridge was closed during the connection attempt
 
     def _caller(self) -> str:
-        """Return the node that the connection stands for."""
+        """Return the name of the subscribing node for which the bridge connects."""
         if self.entry.node.startswith(BRIDGE):
             return self._shared.name
         return self._shared.standing_for(Kind.SUBSCRIPTION, self._topic)
 
     def _connected(self, sock: socket.socket, header: dict[str, str], caller: str) -> None:
         if not self._closed and caller != self._caller():
-            # The node has gone that it was made for. Clients of actions in C++ wait for ever for a
-            # server that is another node on one topic than on the others.
+            # The connection was made in the name of a node that has ended. Action clients in C++
+            # wait for ever if a server has different node names on its topics.
             sock.close()
             if not self._shared.requests.offer(self._connect):
                 self._retry()
@@ -186,7 +182,7 @@ class PublishedTopic:
                 sock.close()
                 self._failed(str(error))
                 return
-        if not self._shared.subscriptions(self._topic):
+        if not self._shared.entities(Kind.SUBSCRIPTION, name=self._topic):
             sock.close()
             return
         publisher = self._publisher
@@ -198,7 +194,7 @@ class PublishedTopic:
         self._stream = Stream(self._shared.loop, sock, self)
 
     def _learn(self, header: dict[str, str]) -> Codec:
-        """Return the codec of the definition that the node has sent."""
+        """Return the codec for the definition in the connection header of the node."""
         entry = self.entry
         type_name = header.get("type", entry.type_name)
         definition = header.get("message_definition", "")
@@ -236,14 +232,14 @@ class PublishedTopic:
         self._shared.changes.later(self._delay, self.update)
         self._delay = min(2 * self._delay, _LAST_RETRY)
 
-    # What the stream calls, on the thread of the loop.
+    # The stream calls the following methods on the thread of the loop.
 
     def space(self) -> memoryview:
-        """Return where the next bytes belong."""
+        """Return the memory for the next bytes."""
         return self._reader.space()
 
     def received(self, count: int) -> None:
-        """Publish the messages that are complete."""
+        """Publish the messages that are now complete."""
         codec, publisher = self._codec, self._publisher
         if codec is None or publisher is None:
             return
@@ -264,7 +260,7 @@ class PublishedTopic:
                     )
 
     def closed(self) -> None:
-        """Connect again if the node is still there."""
+        """Connect again later, and check whether the node is still alive."""
         self._shared.changes.submit(self._lost)
 
     def _lost(self) -> None:
@@ -272,15 +268,3 @@ class PublishedTopic:
             self._stream = None
             self._shared.prober.check(self.entry.node, self.entry.uri)
             self._retry()
-
-
-def _connect_either(answer: list[Any], uri: str) -> socket.socket:
-    """Return a connection to the address that a node names, or to that of its URI."""
-    address = Address(str(answer[1]), int(answer[2]))
-    try:
-        return connect(address)
-    except RoszError:
-        known = Address.parse(uri)
-        if known.host == address.host:
-            raise
-        return connect(Address(known.host, address.port))

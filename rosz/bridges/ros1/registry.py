@@ -1,26 +1,23 @@
-"""What ROS 1's programs have registered at the master: a table of values."""
+"""The table of the registrations of ROS 1's programs at the master."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Literal
 
 import msgspec
 
-__all__ = ("ANY_TYPE", "Change", "Entry", "Registered", "Registry", "Role")
-
 Role = Literal["publisher", "subscriber", "service", "param"]
-"""What a node is registered for; ``param`` are updates of a parameter."""
+"""The role of a registration; ``param`` means a subscription to a parameter."""
 
 ANY_TYPE = "*"
-"""The type of a subscriber that takes every type."""
+"""The type that a subscriber registers to accept every type."""
 
 
-class Entry(msgspec.Struct, frozen=True):
+class RegistryEntry(msgspec.Struct, frozen=True):
     """One registration.
 
     Attributes:
-        role: What the node is registered for.
+        role: Role of the node.
         name: Global name of the topic, service or parameter.
         node: Full name of the node.
         uri: URI of the node's XML-RPC server.
@@ -37,50 +34,29 @@ class Entry(msgspec.Struct, frozen=True):
 
 
 class Change(msgspec.Struct, frozen=True):
-    """A registration that has come or gone.
+    """A registration that was added or removed."""
 
-    Attributes:
-        entry: The registration.
-        alive: Whether it has come.
-    """
-
-    entry: Entry
+    entry: RegistryEntry
     alive: bool
 
 
-class Registered(msgspec.Struct, frozen=True):
-    """The effect of a registration.
-
-    Attributes:
-        changes: Registrations that have gone, and the one that has come.
-        replaced: URI of an older node of the same name, which is to be shut down; empty if there
-            is none.
-    """
-
-    changes: list[Change]
-    replaced: str = ""
-
-
 class Registry:
-    """Registrations by role and name. Not safe for threads."""
+    """Registrations by role and name. The class is not thread-safe."""
 
     def __init__(self) -> None:
-        self._entries: dict[tuple[Role, str], dict[str, Entry]] = {}
-        self._nodes: dict[str, dict[tuple[Role, str], Entry]] = {}
+        self._entries: dict[tuple[Role, str], dict[str, RegistryEntry]] = {}
+        self._nodes: dict[str, dict[tuple[Role, str], RegistryEntry]] = {}
         self._uris: dict[str, str] = {}
         self._types: dict[str, str] = {}
 
-    def register(self, entry: Entry) -> Registered:
-        """Add a registration.
+    def register(self, entry: RegistryEntry) -> list[Change]:
+        """Add a registration, and return the changes: removed registrations, then the new one.
 
-        A node that registers from another URI is a new one of the same name, so everything that
-        the old one has registered goes. A service has one provider, the newest.
+        A node that registers with another URI replaces the node that had its name, so the
+        registrations of the old node are removed. A service has only its newest provider.
         """
         changes: list[Change] = []
-        replaced = ""
-        known = self._uris.get(entry.node)
-        if known is not None and known != entry.uri:
-            replaced = known
+        if self.uri(entry.node) not in {"", entry.uri}:
             changes += self.remove_node(entry.node)
         place = entry.role, entry.name
         others = self._entries.setdefault(place, {})
@@ -97,20 +73,20 @@ class Registry:
             others[entry.node] = entry
             self._nodes.setdefault(entry.node, {})[place] = entry
             self._uris[entry.node] = entry.uri
-        return Registered(changes, replaced)
+        return changes
 
     def unregister(self, role: Role, name: str, node: str, uri: str) -> list[Change]:
         """Remove a registration.
 
         Args:
-            role: Its role.
-            name: Its name.
+            role: Role of the registration.
+            name: Name of the topic, service or parameter.
             node: Full name of the node.
-            uri: URI of the node, or of the service; another one removes nothing, because it is that
-                of an older node of the same name.
+            uri: URI of the node, or of the service; another URI belongs to an older node of the
+                same name, and removes nothing.
 
         Returns:
-            What has changed; empty if there was no such registration.
+            The changes; empty if no registration matches.
         """
         entry = self._entries.get((role, name), {}).get(node)
         if entry is None or uri != (entry.service_uri or entry.uri):
@@ -124,7 +100,7 @@ class Registry:
             changes += self._remove(entry)
         return changes
 
-    def _remove(self, entry: Entry) -> list[Change]:
+    def _remove(self, entry: RegistryEntry) -> list[Change]:
         place = entry.role, entry.name
         others = self._entries[place]
         del others[entry.node]
@@ -133,14 +109,14 @@ class Registry:
             topic = entry.name
             if not any((role, topic) in self._entries for role in ("publisher", "subscriber")):
                 self._types.pop(topic, None)
-        mine = self._nodes[entry.node]
-        del mine[place]
-        if not mine:
+        own = self._nodes[entry.node]
+        del own[place]
+        if not own:
             del self._nodes[entry.node], self._uris[entry.node]
         return [Change(entry, alive=False)]
 
-    def _learn_type(self, entry: Entry) -> None:
-        """Note the type of a topic: that of its publishers, or else of its first subscriber."""
+    def _learn_type(self, entry: RegistryEntry) -> None:
+        """Store the type of a topic; types of publishers replace types of subscribers."""
         if not entry.type_name or entry.type_name == ANY_TYPE:
             return
         if entry.role == "publisher":
@@ -148,16 +124,20 @@ class Registry:
         elif entry.role == "subscriber":
             self._types.setdefault(entry.name, entry.type_name)
 
-    def entries(self, role: Role, name: str) -> list[Entry]:
+    def entries(self, role: Role, name: str) -> list[RegistryEntry]:
         """Return the registrations for a name, oldest first."""
         return list(self._entries.get((role, name), {}).values())
 
     def by_name(self, role: Role) -> dict[str, list[str]]:
-        """Return the nodes of each name of a role."""
-        return {name: list(known) for (each, name), known in self._entries.items() if each == role}
+        """Return the nodes that are registered in a role, by name."""
+        return {
+            name: list(entries)
+            for (entry_role, name), entries in self._entries.items()
+            if entry_role == role
+        }
 
     def types(self) -> dict[str, str]:
-        """Return the types of topics, as far as anybody has told them."""
+        """Return the known types of topics, by topic."""
         return dict(self._types)
 
     def uri(self, node: str) -> str:
@@ -168,10 +148,6 @@ class Registry:
         """Return the URIs of all nodes by name."""
         return dict(self._uris)
 
-    def dump(self) -> list[Entry]:
+    def dump(self) -> list[RegistryEntry]:
         """Return all registrations, oldest first for each name."""
-        return [entry for known in self._entries.values() for entry in known.values()]
-
-    def load(self, entries: Iterable[Entry]) -> list[Change]:
-        """Add registrations that another table had; return what has changed."""
-        return [change for entry in entries for change in self.register(entry).changes]
+        return [entry for entries in self._entries.values() for entry in entries.values()]

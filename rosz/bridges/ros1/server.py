@@ -15,15 +15,13 @@ from functools import partial
 from typing import Any
 from weakref import WeakMethod
 
-from rosz.bridges.ros1.calls import Call, CallReader, encode_fault, encode_refusal, encode_result
+from rosz.bridges.ros1.calls import CallReader, RpcCall, encode_fault, encode_refusal, encode_result
 from rosz.bridges.ros1.frames import FrameReader, decode_header
-from rosz.bridges.ros1.sockets import SocketLoop, Stream, log
+from rosz.bridges.ros1.sockets import Handler, SocketLoop, Stream, log
 from rosz.errors import DecodeError, RoszError, TransportError
 from rosz.worker import Worker
 
-__all__ = ("Dispatch", "Incoming", "Server")
-
-Dispatch = Callable[[Call, Stream], Any]
+Dispatch = Callable[[RpcCall, Stream], Any]
 """Function that returns the result of a call."""
 
 _POST = b"POST"
@@ -43,13 +41,8 @@ _MAX_HELD = 256 << 20
 """Bytes of calls and headers that have not been answered yet, of all connections together."""
 
 
-class Server:
+class Ros1Server:
     """Listens for calls and connections of ROS 1's programs, once it is started.
-
-    Args:
-        loop: The loop that reads.
-        host: Address to listen at.
-        port: Port to listen at; 0 for any.
 
     Attributes:
         port: Port that it listens at.
@@ -148,19 +141,10 @@ class Server:
             self._streams.add(incoming.stream)
 
 
-class Incoming:
-    """A connection that another program has made: calls, or one header.
+class Incoming(Handler):
+    """A connection that another program has made: calls, or one header."""
 
-    Args:
-        server: The server that accepted it.
-        sock: The socket.
-
-    Attributes:
-        server: As given.
-        stream: The stream.
-    """
-
-    def __init__(self, server: Server, sock: socket.socket) -> None:
+    def __init__(self, server: Ros1Server, sock: socket.socket) -> None:
         self.server = server
         self._held = 0
         self._first = b""
@@ -191,9 +175,6 @@ class Incoming:
             self._feed_calls(self._calls, data)
         elif self._frames is not None:
             self._feed_header(self._frames, data)
-
-    def closed(self) -> None:
-        """Do nothing: the server forgets the stream."""
 
     def hold(self, count: int) -> None:
         """Note how many bytes of a request that is not complete the connection holds.
@@ -228,7 +209,7 @@ class Incoming:
             self.stream.send([encode_refusal(str(error))])
             raise
 
-    def _answer(self, call: Call) -> None:
+    def _answer(self, call: RpcCall) -> None:
         try:
             data = encode_result(
                 self.server.dispatch(call, self.stream), keep_alive=call.keep_alive
@@ -262,9 +243,9 @@ class Incoming:
         check = WeakMethod(self._check_progress)
 
         def run() -> None:
-            found = check()
-            if found is not None:
-                found()
+            method = check()
+            if method is not None:
+                method()
 
         self.server.loop.later(_TIMEOUT, run)
 

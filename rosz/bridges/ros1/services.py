@@ -10,11 +10,11 @@ from struct import Struct
 from typing import Any
 
 from rosz.bridges.ros1.frames import MAX_FRAME, FrameReader, encode_header, frame
-from rosz.bridges.ros1.peers import Address, connect, exchange_headers, receive
-from rosz.bridges.ros1.registry import ANY_TYPE, Entry
+from rosz.bridges.ros1.peers import Address, connect_either, exchange_headers, receive
+from rosz.bridges.ros1.registry import ANY_TYPE, RegistryEntry
 from rosz.bridges.ros1.server import Incoming
-from rosz.bridges.ros1.shared import Shared
-from rosz.bridges.ros1.sockets import log
+from rosz.bridges.ros1.shared import BridgeResources
+from rosz.bridges.ros1.sockets import Handler, log
 from rosz.errors import (
     ClosedError,
     DecodeError,
@@ -27,13 +27,11 @@ from rosz.node import BridgedNode, Client, Service
 from rosz.qos import SERVICES
 from rosz.wire import Kind
 
-__all__ = ("Clients", "ProvidedService", "ServiceConnection")
-
 _LENGTH = Struct("<I")
 _OK = b"\1"
 _FAILED = b"\0"
 _REFUSED = "service cannot process request: "
-"""What rospy writes before the text of an error, and rosz, too."""
+"""Beginning of the text of an error, as in rospy."""
 
 _KEPT = 1 << 20
 """Bytes that a connection keeps for its next request."""
@@ -46,15 +44,9 @@ _TIMEOUT = 24 * 3600.0
 
 
 class ProvidedService:
-    """A service that a node of ROS 1 provides.
+    """A service that a node of ROS 1 provides."""
 
-    Args:
-        shared: What the bridge shares.
-        node: The node.
-        entry: Its registration.
-    """
-
-    def __init__(self, shared: Shared, node: BridgedNode, entry: Entry) -> None:
+    def __init__(self, shared: BridgeResources, node: BridgedNode, entry: RegistryEntry) -> None:
         self.entry = entry
         self._shared = shared
         self._node = node
@@ -66,7 +58,7 @@ class ProvidedService:
         self._probe_soon()
 
     def update(self) -> None:
-        """Do nothing: a service does not depend on what else there is."""
+        """Do nothing: a service does not depend on the network."""
 
     def close(self) -> None:
         """Take the service from the network; calls that are running fail."""
@@ -132,19 +124,7 @@ class ProvidedService:
                 )
 
     def _connect(self) -> socket.socket:
-        """Return a connection to the provider.
-
-        Raises:
-            TransportError: It cannot be reached.
-        """
-        address = Address.parse(self.entry.service_uri)
-        try:
-            return connect(address)
-        except TransportError:
-            known = Address.parse(self.entry.uri)
-            if known.host == address.host:
-                raise
-            return connect(Address(known.host, address.port))
+        return connect_either(Address.parse(self.entry.service_uri), self.entry.uri)
 
     def _fields(self, md5sum: str) -> dict[str, str]:
         return {"callerid": self._shared.name, "service": self.entry.name, "md5sum": md5sum}
@@ -175,14 +155,9 @@ class ProvidedService:
 
 
 class Clients:
-    """Clients of services on the network, one for each service that ROS 1's programs call.
+    """Clients of services on the network, one for each service that ROS 1's programs call."""
 
-    Args:
-        node: The node that they belong to.
-        shared: What the bridge shares.
-    """
-
-    def __init__(self, node: BridgedNode, shared: Shared) -> None:
+    def __init__(self, node: BridgedNode, shared: BridgeResources) -> None:
         self._node = node
         self._shared = shared
         self._clients: dict[str, Client] = {}
@@ -193,40 +168,37 @@ class Clients:
         Raises:
             RoszError: Nobody serves it, or its type is not known; the text says so.
         """
-        servers = self._shared.servers(service)
+        servers = self._shared.entities(Kind.SERVICE, name=service)
         if not servers:
             raise ServiceNotFound(f"nobody on the network serves '{service}'")
         token = servers[0]
-        known = self._clients.get(service)
-        if known is not None and known.matches(token):
-            return known
+        before = self._clients.get(service)
+        if before is not None and before.matches(token):
+            return before
         cls = self._shared.context.types.service(token.type_name)
         client = self._node.keep(Client(self._node, service, cls, SERVICES, _TIMEOUT))
         self._clients[service] = client
-        if known is not None:
-            known.close()
+        if before is not None:
+            before.close()
         return client
 
     def update(self, service: str) -> None:
         """Close the client of a service that nobody serves any more."""
-        if service in self._clients and not self._shared.servers(service):
+        if service in self._clients and not self._shared.entities(Kind.SERVICE, name=service):
             self._clients.pop(service).close()
 
 
-class ServiceConnection:
+class ServiceConnection(Handler):
     """A connection on which a program of ROS 1 calls a service of the network.
 
     Args:
-        shared: What the bridge shares.
-        incoming: The connection.
-        client: The client that passes the calls on.
         persistent: Whether more than one call may come.
         submit: Function that runs a task on a thread that may wait; returns whether it will.
     """
 
     def __init__(
         self,
-        shared: Shared,
+        shared: BridgeResources,
         incoming: Incoming,
         client: Client,
         *,
@@ -274,9 +246,6 @@ class ServiceConnection:
         self._incoming.hold(self._reader.pending)
         if not self._reader.pending and self._reader.size > _KEPT:
             self._reader = FrameReader(MAX_FRAME)
-
-    def closed(self) -> None:
-        """Do nothing: a call that is running goes on."""
 
     def _follow(self) -> None:
         if not self._stream.is_closed:

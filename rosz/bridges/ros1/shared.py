@@ -1,33 +1,32 @@
-"""What the parts of a bridge share."""
+"""Objects that the parts of a bridge share."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import msgspec
 
 from rosz.bridges.logs import GATHERED, LOGS
 from rosz.bridges.ros1.codec import Codecs
-from rosz.bridges.ros1.prober import Prober
-from rosz.bridges.ros1.rosout import log_tokens
+from rosz.bridges.ros1.peers import Prober
 from rosz.bridges.ros1.sockets import SocketLoop, log
 from rosz.lifecycle import Lifecycle
 from rosz.names import is_of_action
 from rosz.node import Context
+from rosz.qos import for_queue
 from rosz.wire import Kind, Token, format_token, gid
 from rosz.worker import Worker
 
-__all__ = ("BRIDGE", "MASTER", "MASTER_NODE", "QUEUE", "Connection", "Identity", "Shared")
-
 BRIDGE = "/ros1_bridge_"
-"""What the names of bridges begin with that join a master of ROS 1.
+"""Beginning of the names of bridges that join a master of ROS 1.
 
-What stands under such a name at a master, or comes from one to the network, has crossed a bridge.
+An entity of such a name, at a master or on the network, has crossed a bridge.
 No bridge takes it across again, so that rings of bridges do not pass messages round for ever.
 """
 
 MASTER_NODE = "/ros1_master_"
-"""What the names of rosz's own masters begin with, as nodes of the network."""
+"""Beginning of the names of rosz's own masters, as nodes of the network."""
 
 MASTER = "/master"
 """The name under which a master calls nodes."""
@@ -35,12 +34,13 @@ MASTER = "/master"
 QUEUE = 10
 """Messages of a topic that wait, where nothing else is known."""
 
+_LOG_QUEUE = 1000
 _THREADS = 16
 _MAX_REQUESTS = 10_000
 _MAX_IDENTITIES = 10_000
 
 
-class Connection(msgspec.Struct, frozen=True):
+class TopicConnection(msgspec.Struct, frozen=True):
     """A connection between the bridge and a node of ROS 1 for a topic.
 
     Attributes:
@@ -57,7 +57,7 @@ class Connection(msgspec.Struct, frozen=True):
 
 
 class Identity(msgspec.Struct):
-    """What a node of ROS 1, or an entity of one, keeps when it goes and comes again.
+    """The numbers that a node of ROS 1, or an entity of one, keeps when it goes and comes again.
 
     Attributes:
         number: Number within the session.
@@ -71,33 +71,27 @@ class Identity(msgspec.Struct):
     started: int | None = None
 
 
-class Shared:
-    """What the parts of a bridge share.
+class BridgeResources:
+    """Objects that the parts of a bridge share.
 
     Args:
         context: The context, which the bridge owns.
-        name: Full name of the bridge, as ROS 1's programs see it.
         namespace: Namespace on the network for all names of ROS 1; empty for none.
         is_master: Whether nodes of the network are nodes of ROS 1, too, and ``/rosout`` is.
 
     Attributes:
-        context: The context.
-        name: Full name of the bridge.
-        namespace: As given.
+        name: Full name of the bridge, as ROS 1's programs see it; empty until it listens.
         codecs: Message types on both sides.
         loop: The thread that reads from sockets.
-        requests: Threads for what waits for other programs.
+        requests: Threads for calls that wait for other programs.
         changes: One thread, on which all declarations on the network come and go.
-        prober: What looks whether nodes of ROS 1 are still there.
+        prober: Checks whether nodes of ROS 1 are still there.
         gids: Ids of the publishers of this bridge.
-        lifecycle: The lifecycle of the bridge.
     """
 
-    def __init__(
-        self, context: Context, name: str, namespace: str = "", *, is_master: bool = False
-    ) -> None:
+    def __init__(self, context: Context, namespace: str = "", *, is_master: bool = False) -> None:
         self.context = context
-        self.name = name
+        self.name = ""
         self.namespace = namespace
         self.codecs = Codecs(context.types)
         self.loop = SocketLoop("rosz-ros1")
@@ -108,7 +102,7 @@ class Shared:
         self.prober = Prober(self.requests, self.changes)
         self.gids: set[bytes] = set()
         self.lifecycle = Lifecycle("the bridge to ROS 1", log=log)
-        self._log_tokens: tuple[Token, ...] = log_tokens(context) if is_master else ()
+        self._log_tokens: tuple[Token, ...] = _log_tokens(context) if is_master else ()
         self._is_master = is_master
         self._crossed: dict[bytes, bool] = {}
         self._standing: dict[tuple[Kind, str], str] = {}
@@ -125,11 +119,11 @@ class Shared:
             kind: NODE, or the kind of the entity, of which the node has one at a time.
             name: Name of its topic or service.
         """
-        known = self._identities
-        identity = known.pop((node, kind, name), None) or Identity(self.context.next_id())
-        known[node, kind, name] = identity
-        if len(known) > _MAX_IDENTITIES:
-            del known[next(iter(known))]
+        identities = self._identities
+        identity = identities.pop((node, kind, name), None) or Identity(self.context.next_id())
+        identities[node, kind, name] = identity
+        if len(identities) > _MAX_IDENTITIES:
+            del identities[next(iter(identities))]
         return identity
 
     def here(self, name: str) -> str:
@@ -149,8 +143,8 @@ class Shared:
             name: Name of their topic or service on the network; None for all.
         """
         own = self.context.session.zid
-        found = self.context.graph.view().entities(*kinds, name=name)
-        return [t for t in found if t.zid != own and not is_of_action(t.name)] + [
+        tokens = self.context.graph.view().entities(*kinds, name=name)
+        return [t for t in tokens if t.zid != own and not is_of_action(t.name)] + [
             t
             for t in self._log_tokens
             if (not kinds or t.kind in kinds) and (name is None or t.name == name)
@@ -166,10 +160,6 @@ class Shared:
         A connection is for all nodes of the network that publish a topic, or subscribe to it. One
         of them stands for all, as long as it is there, so that ROS 1's tools show a node they know.
 
-        Args:
-            kind: PUBLISHER or SUBSCRIPTION.
-            topic: Name of the topic on the network.
-
         Returns:
             Full name of the node; that of the bridge if it is none of ROS 1.
         """
@@ -179,18 +169,14 @@ class Shared:
         if not nodes:
             self._standing.pop((kind, topic), None)
             return self.name
-        known = self._standing.get((kind, topic), "")
-        if known not in nodes:
-            known = LOGS if LOGS in nodes else nodes[0]
-            self._standing[kind, topic] = known
-        return known
+        standing = self._standing.get((kind, topic), "")
+        if standing not in nodes:
+            standing = LOGS if LOGS in nodes else nodes[0]
+            self._standing[kind, topic] = standing
+        return standing
 
     def has_crossed(self, publisher: bytes) -> bool:
-        """Return whether messages of a publisher are those of a bridge that joined another master.
-
-        Args:
-            publisher: Its id.
-        """
+        """Return whether a publisher, given by its id, is a bridge that joined another master."""
         if self._is_master:
             return False  # ROS 1's programs are to get them
         if publisher not in self._crossed:
@@ -200,20 +186,32 @@ class Shared:
             }
         return self._crossed.get(publisher, False)
 
-    def publishers(self, topic: str) -> list[Token]:
-        """Return the publishers of a topic on the network."""
-        return self.entities(Kind.PUBLISHER, name=topic)
-
-    def subscriptions(self, topic: str) -> list[Token]:
-        """Return the subscriptions of a topic on the network."""
-        return self.entities(Kind.SUBSCRIPTION, name=topic)
-
-    def servers(self, service: str) -> list[Token]:
-        """Return the servers of a service on the network."""
-        return self.entities(Kind.SERVICE, name=service)
-
     def close(self) -> None:
         """End all threads."""
         self.changes.close()
         self.requests.close(0)
         self.loop.close()
+
+
+def _log_tokens(context: Context) -> tuple[Token, ...]:
+    """Return the entities of the node ``/rosout`` of ROS 1's master, which are of no session.
+
+    The node repeats the logs of all nodes on ``/rosout_agg``. It is there for programs of ROS 1
+    alone: every node of the network may subscribe to ``/rosout``.
+    """
+    cls = context.types.message("rcl_interfaces/Log")
+    entity = partial(
+        Token,
+        context.domain,
+        zid="",
+        node_id=0,
+        namespace="/",
+        node=LOGS.removeprefix("/"),
+        type_name=cls._type_name,
+        type_hash=cls._type_hash,
+        qos=for_queue(_LOG_QUEUE),
+    )
+    return (
+        entity(entity_id=1, kind=Kind.SUBSCRIPTION, name=LOGS),
+        entity(entity_id=2, kind=Kind.PUBLISHER, name=GATHERED),
+    )

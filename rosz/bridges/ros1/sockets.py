@@ -12,12 +12,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Protocol
+from functools import partial
 
 from rosz.errors import RoszError
 from rosz.worker import Worker
-
-__all__ = ("Handler", "SocketLoop", "Stream", "log")
 
 log = logging.getLogger("rosz.ros1")
 
@@ -30,11 +28,15 @@ _KEEPALIVE = (("TCP_KEEPIDLE", 5), ("TCP_KEEPINTVL", 2), ("TCP_KEEPCNT", 3))
 """Seconds and probes after which a peer whose machine has gone counts as gone."""
 
 
-class Handler(Protocol):
-    """What receives from a stream; its methods are called on the thread of the loop."""
+class Handler:
+    """The receiver of a stream; its methods are called on the thread of the loop.
+
+    A subclass that does not define `received` or `closed` does nothing then.
+    """
 
     def space(self) -> memoryview:
         """Return where the next bytes belong; never empty."""
+        raise NotImplementedError
 
     def received(self, count: int) -> None:
         """Handle bytes that were put there; a `RoszError` is logged and closes the stream."""
@@ -44,11 +46,7 @@ class Handler(Protocol):
 
 
 class SocketLoop:
-    """The thread that reads from all sockets of a bridge, and writes what had to wait.
-
-    Args:
-        name: Name of the thread.
-    """
+    """The thread that reads from all sockets of a bridge, and writes messages that had to wait."""
 
     def __init__(self, name: str) -> None:
         self._selector = selectors.DefaultSelector()
@@ -79,13 +77,13 @@ class SocketLoop:
         Args:
             sock: The socket.
             events: ``selectors.EVENT_READ`` and ``EVENT_WRITE``, or 0 for none any more.
-            ready: Function called with what it is ready for.
+            ready: Function called with the events that have come.
         """
-        known = sock.fileno() in self._selector.get_map()
+        watched = sock.fileno() in self._selector.get_map()
         if not events:
-            if known:
+            if watched:
                 self._selector.unregister(sock)
-        elif known:
+        elif watched:
             self._selector.modify(sock, events, ready)
         else:
             self._selector.register(sock, events, ready)
@@ -111,7 +109,7 @@ class SocketLoop:
                 if wait <= 0:
                     return heapq.heappop(self._timers)[2]
             for key, events in self._selector.select(wait):
-                self._tasks.append(_bind(key.data, events))
+                self._tasks.append(partial(key.data, events))
         return self._tasks.popleft()
 
     def _drain(self, _events: int) -> None:
@@ -119,28 +117,19 @@ class SocketLoop:
             self._wakened.recv(4096)
 
 
-def _bind(ready: Callable[[int], object], events: int) -> Callable[[], object]:
-    return lambda: ready(events)
-
-
 class Stream:
-    """A connected socket: what comes goes to a handler, what is sent may wait.
+    """A connected socket: a handler gets the received bytes, and sent messages may wait.
 
     Args:
-        loop: The loop that reads from it.
         sock: The socket; the stream owns it.
-        handler: What receives.
         ended: Function called with the stream when it has ended, whatever its handler is then.
 
     Attributes:
-        handler: What receives; may be replaced on the thread of the loop.
+        handler: Receives the bytes; may be replaced on the thread of the loop.
         peer: Address of the other end, for the log.
         host: Host of the other end.
         local_host: Address of this end.
         depth: Number of newest messages that wait to be sent; None for all.
-        dropped: Number of messages that newer ones have displaced.
-        received_bytes: Number of bytes received.
-        sent_bytes: Number of bytes sent.
     """
 
     def __init__(
@@ -155,7 +144,6 @@ class Stream:
         self.host, self.peer = _name_of(sock)
         self.local_host: str = sock.getsockname()[0]
         self.depth: int | None = None
-        self.dropped = 0
         self.received_bytes = 0
         self.sent_bytes = 0
         self._loop = loop
@@ -178,11 +166,7 @@ class Stream:
         return self._closed
 
     def send(self, parts: Sequence[bytes]) -> None:
-        """Send a message, or queue it; any thread may.
-
-        Args:
-            parts: Bytes of the message in turn.
-        """
+        """Send a message, or queue it; any thread may."""
         with self._lock:
             if self._closed or self._ending:
                 return
@@ -323,7 +307,6 @@ class Stream:
         ):
             self._queued -= sum(map(len, self._queue[first]))
             del self._queue[first]
-            self.dropped += 1
 
 
 def _set_options(sock: socket.socket) -> None:

@@ -16,17 +16,15 @@ from typing import Any
 
 from rosz.bridges.ros1.codec import Codec
 from rosz.bridges.ros1.frames import encode_header
-from rosz.bridges.ros1.registry import ANY_TYPE, Entry
+from rosz.bridges.ros1.registry import ANY_TYPE, RegistryEntry
 from rosz.bridges.ros1.server import Incoming
-from rosz.bridges.ros1.shared import QUEUE, Connection, Shared
-from rosz.bridges.ros1.sockets import Stream, log
+from rosz.bridges.ros1.shared import QUEUE, BridgeResources, TopicConnection
+from rosz.bridges.ros1.sockets import Handler, Stream, log
 from rosz.errors import ClosedError, DecodeError, MessageError, RoszError
 from rosz.node import BridgedNode, Entity, MessageInfo, Subscription
 from rosz.qos import for_queue
 from rosz.session import PullSubscriber, Sample
 from rosz.wire import Kind, Token, read_attachment
-
-__all__ = ("SubscribedTopic",)
 
 _LENGTH = Struct("<I")
 _ALL = 1 << 17
@@ -37,30 +35,24 @@ _MANY_PARTS = 32
 
 
 class SubscribedTopic:
-    """A topic that a node of ROS 1 subscribes to.
+    """A topic that a node of ROS 1 subscribes to."""
 
-    Args:
-        shared: What the bridge shares.
-        node: The node.
-        entry: Its registration.
-    """
-
-    def __init__(self, shared: Shared, node: BridgedNode, entry: Entry) -> None:
+    def __init__(self, shared: BridgeResources, node: BridgedNode, entry: RegistryEntry) -> None:
         self.entry = entry
         self._topic = shared.here(entry.name)
         self._shared = shared
         self._node = node
-        self._shown: _Shown | None = None
+        self._shown: _ShownSubscription | None = None
         self._links: list[_Link] = []
         self._waiting: tuple[Incoming, dict[str, str]] | None = None
         self._published = False
         self._closed = False
         self.update()
 
-    def connections(self) -> list[Connection]:
+    def connections(self) -> list[TopicConnection]:
         """Return the connections of the node to the bridge."""
         return [
-            Connection(self.entry.node, False, link.stream.sent_bytes, link.sent)
+            TopicConnection(self.entry.node, False, link.stream.sent_bytes, link.sent)
             for link in list(self._links)
         ]
 
@@ -68,19 +60,22 @@ class SubscribedTopic:
         """Show the node as a subscriber while it is not connected; then adapt the queues."""
         if self._closed:
             return
-        if self._waiting is not None and self._shared.publishers(self._topic):
+        if self._waiting is not None and self._shared.entities(Kind.PUBLISHER, name=self._topic):
             waiting, self._waiting = self._waiting, None
             self.accept(*waiting)
         if self._links:
-            depth = _depth(self._shared.publishers(self._topic))
+            depth = _depth(self._shared.entities(Kind.PUBLISHER, name=self._topic))
             for link in self._links:
                 link.stream.depth = depth
             return
-        before, self._published = self._published, bool(self._shared.publishers(self._topic))
+        before, self._published = (
+            self._published,
+            bool(self._shared.entities(Kind.PUBLISHER, name=self._topic)),
+        )
         if self._shown is None:
             self._show()
         elif before and not self._published:
-            self._shown.take()  # nobody expects that to arrive with what others publish later
+            self._shown.take()  # nobody expects it with the messages of later publishers
 
     def _show(self) -> None:
         if self.entry.type_name == ANY_TYPE:
@@ -93,17 +88,21 @@ class SubscribedTopic:
         entry = self.entry
         number = self._shared.identity(entry.node, Kind.SUBSCRIPTION, entry.name).number
         with suppress(ClosedError):
-            self._shown = self._node.keep(_Shown(self._node, self._topic, codec, number))
+            self._shown = self._node.keep(
+                _ShownSubscription(self._node, self._topic, codec, number)
+            )
 
     def accept(self, incoming: Incoming, header: dict[str, str]) -> None:
-        """Send what the network publishes to a connection of the node."""
+        """Send the messages of the network to a connection of the node."""
         shared = self._shared
         source = shared.source(self.entry.name)
-        publishers = shared.publishers(self._topic)
+        publishers = shared.entities(Kind.PUBLISHER, name=self._topic)
         if not publishers:
-            # The last has just gone, and the next may come at once. What is refused or closed now
-            # may not try again: roscpp takes it for the connection to the next.
-            self._wait(incoming, header)
+            # The last has just gone, and the next may come at once. A subscriber that
+            # is refused now may not try again: roscpp takes it for the connection to the next.
+            before, self._waiting = self._waiting, (incoming, header)
+            if before is not None:  # the node has made another connection
+                before[0].stream.end()
             return
         try:
             codec = _choose(shared, source, publishers, header)
@@ -113,7 +112,7 @@ class SubscribedTopic:
             return
         own = set() if source != self.entry.name else shared.gids
         link = _Link(shared, self._node, incoming.stream, codec, own, self._drop)
-        kept = f"{self.entry.name} connected"  # not that of what is shown until then
+        kept = f"{self.entry.name} connected"  # not that of the subscription shown until then
         identity = shared.identity(self.entry.node, Kind.SUBSCRIPTION, kept)
         number = None if self._links else identity.number
         self._links.append(link)
@@ -121,12 +120,6 @@ class SubscribedTopic:
         link.open(self.entry.name, shared.here(source), publishers, shown, number)
         if shown is not None:
             shown.close()  # later than the link subscribes, so that publishers see no gap
-
-    def _wait(self, incoming: Incoming, header: dict[str, str]) -> None:
-        """Keep a connection until there is a publisher, or the node makes another one."""
-        before, self._waiting = self._waiting, (incoming, header)
-        if before is not None:
-            before[0].stream.end()
 
     def close(self) -> None:
         """Take the topic from the network, and end the connections."""
@@ -145,16 +138,10 @@ class SubscribedTopic:
             link.close()
 
 
-class _Shown(Entity):
+class _ShownSubscription(Entity):
     """A subscription that others see, and that keeps the newest messages for the first link.
 
     It has no thread, so that many of them cost little.
-
-    Args:
-        node: The node that subscribes.
-        topic: Name of the topic on the network.
-        codec: Type of the topic.
-        number: Number of the subscription within the session.
     """
 
     def __init__(self, node: BridgedNode, topic: str, codec: Codec, number: int) -> None:
@@ -162,7 +149,7 @@ class _Shown(Entity):
         super().__init__(
             node, Kind.SUBSCRIPTION, topic, cls._type_name, cls._type_hash, qos, number=number
         )
-        # What ROS 1 publishes on this topic, the node receives without the bridge.
+        # The node receives messages of ROS 1's publishers without the bridge.
         self._samples: PullSubscriber = self.keep(
             node.context.session.pull_subscriber(self.key, QUEUE, remote_only=True)
         )
@@ -173,52 +160,42 @@ class _Shown(Entity):
         return self._samples.take()
 
 
-def _choose(shared: Shared, topic: str, publishers: list[Token], header: dict[str, str]) -> Codec:
-    """Return the codec for a connection of a subscriber.
-
-    Raises:
-        RoszError: There is no publisher of the type that it wants; the text says what there is.
-    """
+def _choose(
+    shared: BridgeResources, topic: str, publishers: list[Token], header: dict[str, str]
+) -> Codec:
+    """Return the codec for a connection of a subscriber."""
     wanted = header.get("md5sum", ANY_TYPE)
-    found: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     for token in publishers:
         try:
             codec = shared.codecs.of_network(topic, token.type_name, token.type_hash)
         except RoszError as error:
-            found[token.type_name] = str(error)
+            reasons[token.type_name] = str(error)
             continue
         if codec.fits(wanted):
             return codec
-        found[token.type_name] = f"topic '{topic}' is {codec.ros1_type} (md5 {codec.md5sum})"
-    there = "; ".join(found.values())
+        reasons[token.type_name] = f"topic '{topic}' is {codec.ros1_type} (md5 {codec.md5sum})"
+    there = "; ".join(reasons.values())
     raise RoszError(f"{there}; expected {header.get('type', '')} (md5 {wanted})")
 
 
 def _depth(publishers: Iterable[Token]) -> int:
     """Return how many messages wait for a slow subscriber: as many as for each publisher alone."""
-    known = [token.qos for token in publishers if token.qos is not None]
-    return sum(_ALL if qos.history == "keep_all" else qos.depth for qos in known) or QUEUE
+    profiles = [token.qos for token in publishers if token.qos is not None]
+    return sum(_ALL if qos.history == "keep_all" else qos.depth for qos in profiles) or QUEUE
 
 
-class _Link:
+class _Link(Handler):
     """One connection of a subscriber, and the subscription that feeds it.
 
     Args:
-        shared: What the bridge shares.
-        node: The node that subscribes.
-        stream: The connection.
-        codec: Type of the topic.
         own: Ids of the publishers whose messages are left out.
         ended: Function called with the link when the connection has ended.
-
-    Attributes:
-        stream: The connection.
-        sent: Number of messages sent on it.
     """
 
     def __init__(
         self,
-        shared: Shared,
+        shared: BridgeResources,
         node: BridgedNode,
         stream: Stream,
         codec: Codec,
@@ -243,10 +220,10 @@ class _Link:
         name: str,
         topic: str,
         publishers: list[Token],
-        shown: _Shown | None = None,
+        shown: _ShownSubscription | None = None,
         number: int | None = None,
     ) -> None:
-        """Answer the header, subscribe, and send what was published before.
+        """Answer the header, subscribe, and send earlier messages.
 
         Args:
             name: Name of the topic in ROS 1.
@@ -298,7 +275,7 @@ class _Link:
             self.stream.pause(reading=True)
 
     def _send_early(self, samples: Iterable[Sample]) -> None:
-        """Send what was published before this link subscribed, in part also afterwards."""
+        """Send messages from before this link subscribed; some of them come again afterwards."""
         for sample in samples:
             try:
                 number, _, publisher = read_attachment(sample.attachment)
@@ -332,14 +309,11 @@ class _Link:
         self.stream.send([_LENGTH.pack(sum(map(len, parts))), *parts])
         self.sent += 1
 
-    # What the stream calls, on the thread of the loop.
+    # Called by the stream, on the thread of the loop.
 
     def space(self) -> memoryview:
         """Return where the next bytes belong: a subscriber sends none."""
         return self._piece
-
-    def received(self, count: int) -> None:
-        """Ignore what a subscriber sends."""
 
     def closed(self) -> None:
         """Forget the connection."""

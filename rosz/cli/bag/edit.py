@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from rosz.cli import suggest
-from rosz.cli.bag.group import app
 from rosz.cli.bag.play import list_topics
-from rosz.cli.bag.source import BagArgument, End, Start, Topics, check_times, open_bags
+from rosz.cli.bag.source import BagArgument, Part, app, check_times, open_bags
 from rosz.cli.call import Call
 from rosz.cli.console import count, print_lines
 from rosz.cli.declare import Argument, Option, at_least, no_less_than_zero
@@ -19,8 +18,6 @@ from rosz.errors import BagError, RoszError, UsageError
 
 if TYPE_CHECKING:
     from rosz.bags import BagWriter, Compression
-
-__all__ = ()
 
 _NS = 1_000_000_000
 _COMPRESSIONS = ("none", "bz2", "lz4", "zstd")
@@ -62,18 +59,16 @@ def filter_command(
     show: Annotated[
         str, Option("-p --print EXPRESSION", "Print the value of this for each message.")
     ] = "",
-    topics: Topics = None,
-    start: Start = 0.0,
-    end: End = None,
+    part: Part,
     compression: _Compression = "none",
 ) -> int:
     """Write some of the messages of a bag into another one."""
     from rosz.bags import Bag
-    from rosz.bags.editing import Transfer
-    from rosz.introspect.fields import Filter, FilterFailed
+    from rosz.bags.edit import Transfer
+    from rosz.introspect import Filter, FilterFailed
     from rosz.msgs.builtin_interfaces.msg import Time
 
-    check_times(start, end)
+    check_times(part.start, part.end)
     _check_output(output, [bag])
     condition = Filter(expression) if expression else None
     shown = Filter(show) if show else None
@@ -81,7 +76,7 @@ def filter_command(
     with open_bags([bag]) as source, _created(output, compression) as writer:
         decode = Bag(source.readers[0], types).decoder
         transfer = Transfer(writer, types, source.problems.report)
-        for number, entry in enumerate(source.entries(topics, start, end), 1):
+        for number, entry in enumerate(source.entries(part), 1):
             if condition is not None or shown is not None:
                 topic = entry.channel.topic
                 message: Any = decode(entry.channel)(entry.data)
@@ -105,7 +100,7 @@ def filter_command(
 def _created(output: str, compression: str) -> Iterator[BagWriter]:
     """Create a bag; a file of its name is replaced when the new one is complete."""
     from rosz.bags import create_writer, form_of
-    from rosz.bags.writing import removed_unfinished
+    from rosz.bags.formats import removed_unfinished
 
     form, wanted = form_of(output), _compression(compression)
     target = Path(output)
@@ -161,7 +156,6 @@ class _Form(NamedTuple):
     compression: str
 
     def create(self, output: str) -> BagWriter:
-        """Create the bag."""
         from rosz.bags import FORMATS, STORAGES, create_writer, form_of
 
         if self.to and self.to not in FORMATS:
@@ -180,7 +174,7 @@ class _Form(NamedTuple):
 
 
 def _write(call: Call, bags: Sequence[str], output: str, form: _Form) -> int:
-    from rosz.bags.editing import Transfer
+    from rosz.bags.edit import Transfer
 
     _check_output(output, bags)
     with (
@@ -193,7 +187,7 @@ def _write(call: Call, bags: Sequence[str], output: str, form: _Form) -> int:
             for attachment in reader.attachments():
                 writer.add_attachment(attachment)
         transfer = Transfer(writer, call.types, source.problems.report)
-        for entry in source.entries():
+        for entry in source.entries(Part()):
             transfer.write(entry)
     print_lines([f"{output}: {count(transfer.count, 'message')}"])
     return int(bool(source.problems.count))
@@ -212,13 +206,13 @@ def split_command(
     compression: _Compression = "none",
 ) -> int:
     """Write a bag as several ones, by time or size."""
-    from rosz.bags.editing import divide
+    from rosz.bags.edit import divide
 
     no_less_than_zero("--duration", duration)
     at_least("--size", size, 0, "MB")
     with open_bags([bag]) as source:
         parts = divide(
-            source.entries(),
+            source.entries(Part()),
             output or (bag if Path(bag).is_file() else f"{bag.rstrip('/')}/"),
             call.types,
             source.problems.report,

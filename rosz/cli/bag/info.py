@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from rosz.cli import suggest
-from rosz.cli.bag.group import app
+from rosz.cli.bag.source import app
 from rosz.cli.console import print_error, print_json, print_lines, warn
 from rosz.cli.declare import Argument, Json, Option
 from rosz.errors import BagError, UsageError, near_miss
-
-__all__ = ()
 
 
 @app.command("info")
@@ -25,8 +23,7 @@ def info_command(
     """Print what is in bags."""
     if key and not as_yaml:
         raise UsageError("-k prints one value of YAML: give -y too")
-    from rosz.bags import open_reader
-    from rosz.bags.summary import format_summary, format_yaml, summarize
+    from rosz.bags import format_summary, format_yaml, open_reader, summarize
 
     code = 0
     rows = []
@@ -62,10 +59,10 @@ def _value(text: str, key: str) -> str:
     value: Any = yaml.safe_load(text)
     for name in key.split("."):
         if not isinstance(value, dict) or name not in value:
-            known = list(value) if isinstance(value, dict) else []
-            raise UsageError(f"there is no key '{key}'{near_miss(name, known)}")
+            keys = list(value) if isinstance(value, dict) else []
+            raise UsageError(f"the bag's description has no key '{key}'{near_miss(name, keys)}")
         value = value[name]
     if not isinstance(value, list):
         return str(value)
-    rows = ["\n  ".join(f"{name}: {one}" for name, one in row.items()) for row in value]
+    rows = ["\n  ".join(f"{name}: {member}" for name, member in row.items()) for row in value]
     return "".join(f"- {row}\n" for row in rows)

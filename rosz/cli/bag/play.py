@@ -8,8 +8,11 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Annotated
 
+from msgspec import Struct, convert
+from msgspec.structs import asdict
+
 from rosz.cli import suggest
-from rosz.cli.bag.group import app
+from rosz.cli.bag.source import app
 from rosz.cli.call import Call
 from rosz.cli.console import print_error, print_lines, takes_escapes, warn
 from rosz.cli.declare import Argument, Option, at_least, no_less_than_zero, per_second
@@ -17,9 +20,7 @@ from rosz.errors import ClosedError, UsageError
 
 if TYPE_CHECKING:
     from rosz.bags import BagReader
-    from rosz.bags.player import Player, Progress
-
-__all__ = ("list_topics",)
+    from rosz.bags.play import Player, PlayOptions, Progress
 
 _TOOL = "play"
 _LISTS = ("--topics", "--pause-topics")
@@ -35,27 +36,27 @@ def list_topics(words: list[str]) -> list[str]:
 
     As rosbag does, ``--topics`` takes all words up to the next option; ``--bags`` ends the list.
     """
-    found: list[str] = []
+    arranged: list[str] = []
     left = iter([*words, ""])
     word = next(left)
     while word:
         if word in _LISTS:
             option, word = word, next(left)
             while word and not word.startswith("-"):
-                found.append(f"{option}={word}")
+                arranged.append(f"{option}={word}")
                 word = next(left)
             continue
         if word == "--clock":
-            found.append(word)
+            arranged.append(word)
             word = next(left)
             if _is_number(word):
-                found.append(f"--hz={word}")
+                arranged.append(f"--hz={word}")
                 word = next(left)
             continue
         if word != "--bags":
-            found.append(word.removeprefix("--bags="))
+            arranged.append(word.removeprefix("--bags="))
         word = next(left)
-    return found
+    return arranged
 
 
 def _is_number(word: str) -> bool:
@@ -66,109 +67,108 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _check_rate(rate: float) -> None:
-    if not 1 / _MOST_TIMES <= rate <= _MOST_TIMES:
-        raise UsageError(
-            f"--rate is {rate:g}; expected a factor above 0, at most {_MOST_TIMES}, such as 2 to"
-            " play twice as fast"
-        )
+class PlayLine(Struct, frozen=True, kw_only=True):
+    """The command line of a player."""
 
-
-@app.command("play", arrange=list_topics)
-def play_command(
-    call: Call,
-    bags: Annotated[list[str], Argument("BAG", source=suggest.files)],
-    *,
-    prefix: Annotated[str, Option("-p --prefix PREFIX", "Put this before all topics.")] = "",
-    quiet: Annotated[bool, Option("-q --quiet", "Print problems only.")] = False,
-    immediate: Annotated[bool, Option("-i --immediate", "Publish without waiting.")] = False,
-    pause: Annotated[bool, Option("--pause", "Begin with a pause.")] = False,
+    bags: Annotated[list[str], Argument("BAG", source=suggest.files)]
+    prefix: Annotated[str, Option("-p --prefix PREFIX", "Put this before all topics.")] = ""
+    quiet: Annotated[bool, Option("-q --quiet", "Print problems only.")] = False
+    immediate: Annotated[bool, Option("-i --immediate", "Publish without waiting.")] = False
+    pause: Annotated[bool, Option("--pause", "Begin with a pause.")] = False
     queue: Annotated[
         int, Option("--queue SIZE", "Depth of queues where the bag has none; 0 for no limit.")
-    ] = 100,
-    clock: Annotated[
-        bool, Option("--clock", "Publish /clock; a rate in hertz may follow.")
-    ] = False,
-    hz: Annotated[float, Option("--hz HZ", "Rate of /clock.")] = _DEFAULT_CLOCK,
-    delay: Annotated[
-        float, Option("-d --delay SECONDS", "Wait after the publishers are made.")
-    ] = 0.2,
-    rate: Annotated[float, Option("-r --rate FACTOR", "Play faster or more slowly.")] = 1.0,
-    start: Annotated[float, Option("-s --start SECONDS", "Leave out the beginning.")] = 0.0,
+    ] = 100
+    clock: Annotated[bool, Option("--clock", "Publish /clock; a rate in hertz may follow.")] = False
+    hz: Annotated[float, Option("--hz HZ", "Rate of /clock.")] = _DEFAULT_CLOCK
+    delay: Annotated[float, Option("-d --delay SECONDS", "Wait after the publishers are made.")] = (
+        0.2
+    )
+    rate: Annotated[float, Option("-r --rate FACTOR", "Play faster or more slowly.")] = 1.0
+    start: Annotated[float, Option("-s --start SECONDS", "Leave out the beginning.")] = 0.0
     duration: Annotated[
         float | None, Option("-u --duration SECONDS", "Play this part of the bags only.")
-    ] = None,
+    ] = None
     skip_empty: Annotated[
         float, Option("--skip-empty SECONDS", "Skip longer times without a message.")
-    ] = 0.0,
-    loop: Annotated[bool, Option("-l --loop", "Begin again at the end.")] = False,
+    ] = 0.0
+    loop: Annotated[bool, Option("-l --loop", "Begin again at the end.")] = False
     keep_alive: Annotated[
         bool, Option("-k --keep-alive", "Stay at the end, for what is latched.")
-    ] = False,
+    ] = False
     wait_for_subscribers: Annotated[
         bool, Option("--wait-for-subscribers", "Wait until each topic has a subscriber.")
-    ] = False,
+    ] = False
     topics: Annotated[
         list[str] | None, Option("--topics TOPIC", "Play these topics only; several may follow.")
-    ] = None,
+    ] = None
     pause_topics: Annotated[
         list[str] | None, Option("--pause-topics TOPIC", "Pause at messages of these topics.")
-    ] = None,
+    ] = None
     rate_control_topic: Annotated[
         str,
         Option("--rate-control-topic TOPIC", "Wait while the stamps of this topic lag behind."),
-    ] = "",
+    ] = ""
     rate_control_max_delay: Annotated[
         float, Option("--rate-control-max-delay SECONDS", "Time by which they may lag behind.")
-    ] = 1.0,
-    try_future: Annotated[bool, Option("--try-future-version")] = False,  # noqa: ARG001  # rosbag's
-) -> int:
+    ] = 1.0
+    # An option of rosbag that changes nothing here.
+    try_future: Annotated[bool, Option("--try-future-version")] = False
+
+    def check(self) -> None:
+        """Check the values.
+
+        Raises:
+            UsageError: One is out of its bounds.
+        """
+        if not 1 / _MOST_TIMES <= self.rate <= _MOST_TIMES:
+            raise UsageError(
+                f"--rate is {self.rate:g}; expected a factor above 0, at most {_MOST_TIMES}, such"
+                " as 2 to play twice as fast"
+            )
+        per_second("--clock" if self.clock else "--hz", self.hz)
+        at_least("--queue", self.queue, 0, "messages")
+        no_less_than_zero("--start", self.start)
+        no_less_than_zero("--delay", self.delay)
+        no_less_than_zero("--duration", self.duration)
+        no_less_than_zero("--skip-empty", self.skip_empty)
+        no_less_than_zero("--rate-control-max-delay", self.rate_control_max_delay)
+
+    def options(self) -> PlayOptions:
+        """Return the options of the player."""
+        from rosz.bags.play import PlayOptions
+
+        fields = asdict(self) | {
+            "clock": self.hz if self.clock else 0.0,
+            "paused": self.pause,
+            "topics": self.topics or (),
+            "pause_topics": self.pause_topics or (),
+        }
+        return convert(fields, PlayOptions)  # which has the other fields by the same names
+
+
+@app.command("play", arrange=list_topics)
+def play_command(call: Call, line: PlayLine) -> int:
     """Publish the messages of bags again, merged by time.
 
     On a terminal, space pauses and goes on, s publishes one message of a pause, and the arrows up
     and down change the rate.
     """
-    _check_rate(rate)
-    per_second("--clock" if clock else "--hz", hz)
-    at_least("--queue", queue, 0, "messages")
-    no_less_than_zero("--start", start)
-    no_less_than_zero("--delay", delay)
-    no_less_than_zero("--duration", duration)
-    no_less_than_zero("--skip-empty", skip_empty)
-    no_less_than_zero("--rate-control-max-delay", rate_control_max_delay)
-    from rosz.bags.player import Player, PlayOptions
+    line.check()
+    from rosz.bags.play import Player
     from rosz.node import Node
 
-    options = PlayOptions(
-        rate=rate,
-        start=start,
-        duration=duration,
-        loop=loop,
-        keep_alive=keep_alive,
-        clock=hz if clock else 0.0,
-        immediate=immediate,
-        paused=pause,
-        wait_for_subscribers=wait_for_subscribers,
-        prefix=prefix,
-        topics=tuple(topics or ()),
-        pause_topics=tuple(pause_topics or ()),
-        delay=delay,
-        queue=queue,
-        skip_empty=skip_empty,
-        rate_control_topic=rate_control_topic,
-        rate_control_max_delay=rate_control_max_delay,
-    )
+    options = line.options()
     sys.setswitchinterval(_SWITCH_SECONDS)
-    screen = _Screen(quiet=quiet)
+    screen = _Screen(quiet=line.quiet)
     with ExitStack() as stack:
-        readers = [stack.enter_context(one) for one in _open(bags, screen)]
+        readers = [stack.enter_context(each) for each in _open(line.bags, screen)]
         node = stack.enter_context(Node(_TOOL, anonymous=True, argv=call.argv))
         player = Player(node, readers, options, screen.warn, screen.update)
         for reader in readers:
             for problem in reader.problems:
                 screen.problem(str(problem))
         try:
-            if wait_for_subscribers:
+            if line.wait_for_subscribers:
                 screen.show("Waiting for subscribers.")
             player.advertise()
             with _keys(player, screen):
@@ -217,7 +217,7 @@ def _keys(player: Player, screen: _Screen) -> Iterator[None]:
 
 
 class _Screen:
-    """What is printed while bags play."""
+    """The terminal while bags play."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
@@ -226,7 +226,6 @@ class _Screen:
         self.problems = 0
 
     def show(self, line: str) -> None:
-        """Print a line."""
         if not self._quiet:
             self._leave()
             print_lines([line])
@@ -237,7 +236,6 @@ class _Screen:
         warn(text)
 
     def problem(self, text: str) -> None:
-        """Print a problem."""
         self.problems += 1
         self._leave()
         print_error(f"ERROR: {text}")
@@ -259,7 +257,6 @@ class _Screen:
         self._shown = True
 
     def end(self) -> None:
-        """Print the end."""
         self.show("Done.")
 
     def _leave(self) -> None:

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from rosz.cli.bag.group import app
+from rosz.cli.bag.source import app, compression_of
 from rosz.cli.call import Call
 from rosz.cli.console import count, print_error, print_json, print_lines, warn
 from rosz.cli.declare import Argument, Json, Option
-from rosz.errors import BagError, RoszError, UsageError
+from rosz.errors import BagError, BagUnindexed, RoszError, UsageError
 
 if TYPE_CHECKING:
     from rosz.bags import Compression
-    from rosz.bags.repair import Copied, Difference
-
-__all__ = ()
+    from rosz.bags.edit import Copied, TypeDifference
 
 _Bags = Annotated[list[str], Argument("BAG")]
 _OutputDir = Annotated[str, Option("--output-dir DIR", "Write to this folder.")]
@@ -27,12 +25,12 @@ _Quiet = Annotated[bool, Option("-q --quiet", "Print problems only.")]
 @app.command("check")
 def check_command(call: Call, bags: _Bags, *, json: Json = False) -> int:
     """Read bags whole, and compare their types with those that are known here."""
-    from rosz.bags.opening import open_reader
-    from rosz.bags.repair import check_bag, find_differences
+    from rosz.bags import open_reader
+    from rosz.bags.edit import check_bag, find_differences
 
     rows = []
     for bag in bags:
-        differences: list[Difference] = []
+        differences: list[TypeDifference] = []
         try:
             read, problems = check_bag(Path(bag))
             with open_reader(bag) as reader:
@@ -44,15 +42,15 @@ def check_command(call: Call, bags: _Bags, *, json: Json = False) -> int:
                 "bag": bag,
                 "messages": read,
                 "problems": [str(problem) for problem in problems],
-                "types": {one.type: one.reason for one in differences},
+                "types": {difference.type: difference.reason for difference in differences},
             }
         )
         if json:
             continue
         for problem in problems:
             print_error(f"ERROR: {problem}")
-        for one in differences:
-            print_lines([f"{bag}: {one.type}: {one.reason}"])
+        for difference in differences:
+            print_lines([f"{bag}: {difference.type}: {difference.reason}"])
         if not problems and not differences:
             print_lines(["Bag file does not need any migrations."])
     if json:
@@ -65,7 +63,7 @@ def fix_command(
     bag: Annotated[str, Argument("BAG")], output: Annotated[str, Argument("OUTPUT")]
 ) -> int:
     """Write what can be read of a damaged bag into a new one."""
-    from rosz.bags.repair import recover
+    from rosz.bags.edit import recover
 
     return _report([recover(Path(bag), output)], quiet=False)
 
@@ -93,9 +91,7 @@ def compress_command(
     quiet: _Quiet = False,
 ) -> int:
     """Compress bags: with zstd in MCAP, with bz2 in ROS 1's format."""
-    chosen: Compression | None = "bz2" if bz2 else "lz4" if lz4 else "zstd" if zstd else None
-    if bz2 + lz4 + zstd > 1:
-        raise UsageError("--bz2, --lz4 and --zstd exclude each other")
+    chosen = compression_of(bz2=bz2, lz4=lz4, zstd=zstd)
     by_suffix: dict[str, Compression] = {".bag": "bz2"}
     return max(
         _rewrite(
@@ -125,7 +121,7 @@ def _rewrite(
     force: bool,
     quiet: bool,
 ) -> int:
-    from rosz.bags.repair import rewrite
+    from rosz.bags.edit import rewrite
 
     code = 0
     folder = Path(output_dir) if output_dir else None
@@ -143,9 +139,7 @@ def _rewrite(
 
 
 def _report(done: Sequence[Copied], *, quiet: bool) -> int:
-    """Print what became of bags; return the exit code, which is 1 if something was damaged."""
-    from rosz.errors import BagUnindexed
-
+    """Print results; return the exit code, which is 1 if something was damaged."""
     code = 0
     for copied in done:
         for problem in copied.problems:

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rosz.cli.bag.group import app
+from msgspec import Struct
+from msgspec.structs import replace
+
 from rosz.cli.bag.play import list_topics
-from rosz.cli.bag.source import BagArgument, End, Input, Start, Topics, check_times, open_bags
+from rosz.cli.bag.source import (
+    BagArgument,
+    BagInput,
+    End,
+    Part,
+    Start,
+    absolute,
+    app,
+    check_times,
+    open_bags,
+)
 from rosz.cli.call import Call
 from rosz.cli.console import count, print_lines, warn
 from rosz.cli.declare import Argument, Json, Option, at_least
@@ -18,13 +30,22 @@ from rosz.errors import MessageError, NotFoundError, UsageError
 
 if TYPE_CHECKING:
     from rosz.bags import BagReader, Channel, Entry, Payload
-    from rosz.introspect.echo import Echo, EchoOptions
+    from rosz.introspect import Echo, EchoOptions
     from rosz.typestore import TypeStore
-
-__all__ = ()
 
 _FORMATS = ("csv", "json", "parquet", "png", "jpg", "mp4")
 _FASTEST = 1000.0
+
+
+class CatForm(Struct, frozen=True, kw_only=True):
+    """The options for the text of each message."""
+
+    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False
+    condition: Annotated[
+        str, Option("--filter EXPRESSION", "Use only messages for which this is true.")
+    ] = ""
+    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False
+    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False
 
 
 @app.command("cat", arrange=list_topics)
@@ -34,32 +55,26 @@ def cat_command(
     topic: Annotated[str, Argument("TOPIC_OR_FIELD", "All topics if omitted.")] = "",
     *,
     limit: Annotated[int | None, Option("-n COUNT", "Stop after this number of messages.")] = None,
-    plot: Annotated[bool, Option("-p", "Print comma-separated numbers, for plotting.")] = False,
-    condition: Annotated[
-        str, Option("--filter EXPRESSION", "Use only messages for which this is true.")
-    ] = "",
-    nostr: Annotated[bool, Option("--nostr", "Leave strings out.")] = False,
-    noarr: Annotated[bool, Option("--noarr", "Leave arrays out.")] = False,
+    form: CatForm,
     start: Start = 0.0,
     end: End = None,
     json: Json = False,
 ) -> int:
     """Print the messages of a bag, as topic echo prints them."""
-    from rosz.introspect.echo import EchoOptions
-    from rosz.introspect.fields import Filter
+    from rosz.introspect import EchoOptions, Filter
 
     check_times(start, end)
     at_least("-n", limit, 1, "messages")
     options = EchoOptions(
-        plot=plot,
+        plot=form.plot,
         as_json=json,
-        no_arrays=noarr,
-        no_strings=nostr,
-        condition=Filter(condition) if condition else None,
+        no_arrays=form.noarr,
+        no_strings=form.nostr,
+        condition=Filter(form.condition) if form.condition else None,
     )
     with open_bags([bag]) as source:
         echoes = _Echoes(source.readers[0], topic, options, call)
-        for entry in source.entries(echoes.topics, start, end):
+        for entry in source.entries(Part(topics=echoes.topics, start=start, end=end)):
             text = echoes.text(entry)
             if text is None:
                 continue
@@ -89,16 +104,14 @@ def export_command(
         float | None, Option("--fps RATE", "Frames per second of mp4; as recorded if omitted.")
     ] = None,
     force: Annotated[bool, Option("-f --force", "Replace files that exist.")] = False,
-    topics: Topics = None,
-    start: Start = 0.0,
-    end: End = None,
+    part: Part,
 ) -> int:
     """Write each topic of a bag into a file: a table, pictures, or a video.
 
     Tables have one row per message, behind the time in nanoseconds. In CSV, sequences are JSON in
     one column, and octets are left out.
     """
-    check_times(start, end)
+    check_times(part.start, part.end)
     form = "json" if json else form
     if form not in _FORMATS:
         raise UsageError(f"--format is '{form}'; expected {', '.join(_FORMATS)}")
@@ -107,7 +120,7 @@ def export_command(
     if fps is not None and not 0 < fps <= _FASTEST:
         raise UsageError(f"--fps is {fps:g}; expected more than 0, and at most {_FASTEST:g}")
     with open_bags([bag]) as source:
-        chosen = _Choice(source, topics, start, end)
+        chosen = _ExportChoice(source, part)
         chosen.entries()  # a topic that is not there is an error before any file is made
         if form in {"csv", "json", "parquet"}:
             lines = _export_tables(chosen, Path(folder), form, call.types, replace=force)
@@ -119,40 +132,37 @@ def export_command(
     return int(bool(source.problems.count))
 
 
-class _Choice:
+class _ExportChoice:
     """The messages of a bag that options choose."""
 
-    def __init__(
-        self, source: Input, topics: Sequence[str] | None, start: float, end: float | None
-    ) -> None:
+    def __init__(self, source: BagInput, part: Part) -> None:
         self.reader = source.readers[0]
         self.report = source.problems.report
         self._source = source
-        self._chosen = topics, start, end
+        self._part = part
 
     def entries(self) -> Iterator[Entry]:
         """Return the messages, from the first one on."""
-        return self._source.entries(*self._chosen)
+        return self._source.entries(self._part)
 
     def choose_images(self) -> dict[str, str]:
         """Choose the topics with images if none are given; return the names of their files."""
-        from rosz.bags.images import IMAGE_TYPES
-        from rosz.bags.tables import file_names
+        from rosz.bags.export import IMAGE_TYPES, file_names
 
-        found = {one.topic: one.type for one in self.reader.channels if one.type in IMAGE_TYPES}
-        given, *times = self._chosen
-        names = [one if one.startswith("/") else f"/{one}" for one in given or found]
-        other = {one.topic: one.type for one in self.reader.channels}
+        types = {channel.topic: channel.type for channel in self.reader.channels}
+        channels = (channel for channel in self.reader.channels if channel.type in IMAGE_TYPES)
+        images = [*dict.fromkeys(channel.topic for channel in channels)]
+        names = [absolute(topic) for topic in self._part.topics or images]
         for name in names:
-            if name in other and name not in found:
-                raise UsageError(f"topic '{name}' has no images, but {other[name]}")
+            if name in types and name not in images:
+                raise UsageError(f"topic '{name}' has no images, but {types[name]}")
         if not names:
             raise NotFoundError("the bag has no topic with images: no Image, no CompressedImage")
-        self._chosen = names, *times  # type: ignore[assignment]
-        return {topic: name for topic, name in file_names(found).items() if topic in names}
+        self._part = replace(self._part, topics=names)
+        return {topic: name for topic, name in file_names(images).items() if topic in names}
 
     @contextmanager
-    def guard(self, entry: Entry) -> Iterator[None]:
+    def left_out_if_damaged(self, entry: Entry) -> Iterator[None]:
         """Report a message that is not well-formed, and go on."""
         try:
             yield
@@ -162,60 +172,60 @@ class _Choice:
 
 
 def _export_tables(
-    chosen: _Choice, folder: Path, form: str, types: TypeStore, *, replace: bool
+    chosen: _ExportChoice, folder: Path, form: str, types: TypeStore, *, replace: bool
 ) -> list[str]:
-    from rosz.bags.tables import Tables
+    from rosz.bags.export import Tables
 
     with Tables(folder, form, chosen.reader.channels, types, replace=replace) as tables:
         for entry in chosen.entries():
-            with chosen.guard(entry):
+            with chosen.left_out_if_damaged(entry):
                 tables.write(entry)
     return [f"{file}: {count(rows, 'row')}" for file, rows in sorted(tables.rows.items())]
 
 
 def _export_pictures(
-    chosen: _Choice, folder: Path, form: str, types: TypeStore, *, replace: bool
+    chosen: _ExportChoice, folder: Path, form: str, types: TypeStore, *, replace: bool
 ) -> list[str]:
     _check_vision()
     from rosz.bags import Bag
-    from rosz.bags.images import Pictures
+    from rosz.bags.export import ImageFiles
 
     names = chosen.choose_images()
     decoder = Bag(chosen.reader, types).decoder
-    found: dict[str, Pictures] = {}
+    files: dict[str, ImageFiles] = {}
     for entry in chosen.entries():
         topic = entry.channel.topic
-        if topic not in found:
-            found[topic] = Pictures(folder / names[topic], form, replace=replace)
-        with chosen.guard(entry):
-            found[topic].write(decoder(entry.channel)(entry.data), entry.stamp)
+        if topic not in files:
+            files[topic] = ImageFiles(folder / names[topic], form, replace=replace)
+        with chosen.left_out_if_damaged(entry):
+            files[topic].write(decoder(entry.channel)(entry.data), entry.stamp)
     return [
-        f"{folder / names[topic]}: {count(one.count, 'picture')}"
-        for topic, one in sorted(found.items())
+        f"{folder / names[topic]}: {count(pictures.count, 'picture')}"
+        for topic, pictures in sorted(files.items())
     ]
 
 
 def _export_videos(
-    chosen: _Choice, folder: Path, rate: float | None, types: TypeStore, *, replace: bool
+    chosen: _ExportChoice, folder: Path, rate: float | None, types: TypeStore, *, replace: bool
 ) -> list[str]:
     _check_vision()
     from rosz.bags import Bag
-    from rosz.bags.images import Video, VideoTimes
+    from rosz.bags.export import Video, VideoTimes
 
     names = chosen.choose_images()
     decoder = Bag(chosen.reader, types).decoder
     times: dict[str, VideoTimes] = {}
     for entry in chosen.entries():
-        with chosen.guard(entry):
+        with chosen.left_out_if_damaged(entry):
             message = decoder(entry.channel)(entry.data)
             times.setdefault(entry.channel.topic, VideoTimes()).add(message, entry.stamp)
     lines = []
     videos: dict[str, Video] = {}
     try:
-        for topic, one in times.items():
-            videos[topic] = Video(folder / f"{names[topic]}.mp4", one, rate, replace=replace)
+        for topic, frames in times.items():
+            videos[topic] = Video(folder / f"{names[topic]}.mp4", frames, rate, replace=replace)
         for entry in chosen.entries():
-            with chosen.guard(entry):
+            with chosen.left_out_if_damaged(entry):
                 videos[entry.channel.topic].write(decoder(entry.channel)(entry.data))
     finally:
         for video in videos.values():
@@ -254,19 +264,18 @@ def plot_command(
 ) -> int:
     """Draw numbers of a bag over time into a picture."""
     from rosz.bags import Bag, class_of
-    from rosz.bags.plotting import check_format, draw, find_curves, read_curves
+    from rosz.bags.export import check_format, draw, find_curves, read_curves
 
     check_times(start, end)
     check_format(Path(output))
     with open_bags([bag]) as source:
         reader = source.readers[0]
-        by_type = {one.type: one for one in reader.channels}
-        known = {one.topic: [one.type] for one in reader.channels}
-        axes = find_curves(fields, known, lambda each: class_of(by_type[each], call.types))
+        by_type = {channel.type: channel for channel in reader.channels}
+        types = {channel.topic: [channel.type] for channel in reader.channels}
+        axes = find_curves(fields, types, lambda each: class_of(by_type[each], call.types))
         topics = [*dict.fromkeys(curve.topic for axis in axes for curve in axis)]
-        read_curves(
-            axes, source.entries(topics, start, end), Bag(reader, call.types).decoder, reader.start
-        )
+        entries = source.entries(Part(topics=topics, start=start, end=end))
+        read_curves(axes, entries, Bag(reader, call.types).decoder, reader.start)
         for curve in (curve for axis in axes for curve in axis):
             if curve.missing:
                 warn(f"{count(curve.missing, 'message')} have no '{curve.label}'")
@@ -281,7 +290,7 @@ class _Echoes:
 
     def __init__(self, reader: BagReader, topic: str, options: EchoOptions, call: Call) -> None:
         from rosz.bags import class_of
-        from rosz.introspect.fields import FieldPath, find_target
+        from rosz.introspect import FieldPath, find_target
 
         self._types = call.types
         self._options = options
@@ -290,10 +299,10 @@ class _Echoes:
         self._path = FieldPath("")
         self.topics: list[str] = []
         if topic:
-            by_type = {one.type: one for one in reader.channels}
-            known = {one.topic: [one.type] for one in reader.channels}
-            name = topic if topic.startswith("/") else f"/{topic}"
-            target = find_target(name, known, lambda each: class_of(by_type[each], self._types))
+            by_type = {channel.type: channel for channel in reader.channels}
+            types = {channel.topic: [channel.type] for channel in reader.channels}
+            name = absolute(topic)
+            target = find_target(name, types, lambda each: class_of(by_type[each], self._types))
             self._path, self.topics = target.path, [target.topic]
 
     def text(self, entry: Entry) -> str | None:
@@ -311,7 +320,7 @@ class _Echoes:
 
     def _make(self, channel: Channel) -> tuple[Echo, Callable[[Payload], Any]]:
         from rosz.bags import class_of, decoder_of
-        from rosz.introspect.echo import Echo
+        from rosz.introspect import Echo
 
         kind = self._path.type_in(class_of(channel, self._types))
         echo = Echo(channel.topic, kind, self._path, self._options, lambda: self._now)

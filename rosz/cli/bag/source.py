@@ -1,4 +1,4 @@
-"""The bags that commands read, and the options that choose of them."""
+"""The group of bag commands, the bags that they read, and the options that choose of them."""
 
 from __future__ import annotations
 
@@ -6,25 +6,34 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Annotated
 
+from msgspec import Struct
+
 from rosz.cli import suggest
+from rosz.cli.call import new_group
 from rosz.cli.console import print_error
 from rosz.cli.declare import Argument, Option, no_less_than_zero
-from rosz.errors import NotFoundError, UsageError, near_miss
+from rosz.errors import BagError, NotFoundError, UsageError, near_miss
 
 if TYPE_CHECKING:
-    from rosz.bags import BagReader, Entry
-    from rosz.errors import BagError
+    from rosz.bags import BagReader, Compression, Entry
 
-__all__ = ("BagArgument", "End", "Input", "Problems", "Start", "Topics", "check_times", "open_bags")
+app = new_group("Record and play bags, show, change and repair them.")
 
 _NS = 1_000_000_000
 
 BagArgument = Annotated[str, Argument("BAG", source=suggest.files)]
-Topics = Annotated[
-    list[str] | None, Option("--topics TOPIC", "Take these topics only; several may follow.")
-]
 Start = Annotated[float, Option("-s --start SECONDS", "Leave out the beginning.")]
 End = Annotated[float | None, Option("--end SECONDS", "Leave out what is later in the bag.")]
+
+
+class Part(Struct, frozen=True, kw_only=True):
+    """The options that choose some messages of a bag."""
+
+    topics: Annotated[
+        list[str] | None, Option("--topics TOPIC", "Take these topics only; several may follow.")
+    ] = None
+    start: Start = 0.0
+    end: End = None
 
 
 class Problems:
@@ -39,45 +48,50 @@ class Problems:
         print_error(f"ERROR: {problem}")
 
 
-class Input:
-    """Bags that are read, and what is chosen of them."""
+class BagInput:
+    """Bags that are read, and their chosen messages."""
 
     def __init__(self, readers: Sequence[BagReader], problems: Problems) -> None:
         self.readers = readers
         self.problems = problems
 
-    def entries(
-        self, topics: Sequence[str] | None = None, start: float = 0.0, end: float | None = None
-    ) -> Iterator[Entry]:
-        """Return messages, merged by time.
-
-        Args:
-            topics: Names of topics; all if there are none.
-            start: Seconds after the begin of the first bag.
-            end: Last second after it.
+    def entries(self, part: Part) -> Iterator[Entry]:
+        """Return the messages of a part, merged by time; its times begin with the first bag.
 
         Raises:
             NotFoundError: The bags have no such topic.
         """
-        from rosz.bags.editing import merged
+        from rosz.bags.edit import merged
 
-        known = {channel.topic for one in self.readers for channel in one.channels}
-        wanted = {one if one.startswith("/") else f"/{one}" for one in topics or ()}
-        for one in sorted(wanted - known):
-            raise NotFoundError(f"no topic '{one}' in the bag{near_miss(one, known)}")
-        first = min((one.start for one in self.readers if one.count()), default=0)
+        topics = {channel.topic for reader in self.readers for channel in reader.channels}
+        wanted = {absolute(topic) for topic in part.topics or ()}
+        for topic in sorted(wanted - topics):
+            raise NotFoundError(f"no topic '{topic}' in the bag{near_miss(topic, topics)}")
+        first = min((reader.start for reader in self.readers if reader.count()), default=0)
         return merged(
             self.readers,
             self.problems.report,
             topics=wanted or None,
-            start=first + int(start * _NS) if start else None,
-            end=None if end is None else first + int(end * _NS),
+            start=first + int(part.start * _NS) if part.start else None,
+            end=None if part.end is None else first + int(part.end * _NS),
         )
 
 
+def compression_of(*, bz2: bool, lz4: bool, zstd: bool) -> Compression | None:
+    """Return the compression that options name, of which only one may be given."""
+    if bz2 + lz4 + zstd > 1:
+        raise UsageError("--bz2, --lz4 and --zstd exclude each other")
+    return "bz2" if bz2 else "lz4" if lz4 else "zstd" if zstd else None
+
+
+def absolute(topic: str) -> str:
+    """Return a name of a topic with the slash before it."""
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
 @contextmanager
-def open_bags(bags: Sequence[str]) -> Iterator[Input]:
-    """Open bags, and print what is damaged of them.
+def open_bags(bags: Sequence[str]) -> Iterator[BagInput]:
+    """Open bags, and print their damage.
 
     Raises:
         BagError: One cannot be read at all.
@@ -90,7 +104,7 @@ def open_bags(bags: Sequence[str]) -> Iterator[Input]:
         for reader in readers:
             for problem in reader.problems:
                 problems.report(problem)
-        yield Input(readers, problems)
+        yield BagInput(readers, problems)
 
 
 def check_times(start: float, end: float | None) -> None:

@@ -18,13 +18,11 @@ import msgspec
 from rosz.errors import LaunchError
 from rosz.packages import PackageIndex, start_words
 
-__all__ = ("LaunchArguments", "LaunchContext", "LaunchText", "SystemContext", "parse_arguments")
-
 _ASSIGNMENT = re.compile(r"(?:[~/A-Za-z]|_|__)[\w/]*:=.*")
 _NAMESPACE = "__ns:="
 
 _MAX_BYTES = 64 * 1024 * 1024
-"""Limit of what is read, because a device or a command may produce data without end."""
+"""Largest size of a file or an output: a device or a command may produce data without end."""
 
 
 class LaunchArguments(msgspec.Struct, frozen=True):

@@ -4,7 +4,7 @@ Attributes are plain text. Text between tags is kept only inside ``<rosparam>``,
 dropped. The column of an attribute is computed only when a message needs it, from the bytes of its
 tag.
 
-The two exceptions here carry what is wrong up to the loader. Code below the loader knows only a
+The two exceptions here carry an error up to the loader. Code below the loader knows only a
 text or an element; the loader also knows the chain of includes and raises `LaunchFileError`.
 """
 
@@ -16,20 +16,8 @@ from xml.parsers import expat
 
 from rosz.errors import LaunchFileError, near_miss
 
-__all__ = (
-    "TAGS",
-    "Document",
-    "Element",
-    "TagError",
-    "TagRule",
-    "TextError",
-    "misplaced",
-    "parse",
-    "unknown_attribute",
-)
-
 _TEXT_TAGS = frozenset({"rosparam"})
-_MAX_ENTITY = 4096
+_MAX_ENTITY = 4096  # a file may refer to an entity any number of times
 _ATTRIBUTE = re.compile(r"""([^\s=/<>"']+)\s*=\s*("[^"]*"|'[^']*')""")
 _REFERENCE = re.compile(r"&[^;\s]+;")
 _NESTED_ENTITY = re.compile(r"&(?!amp;|lt;|gt;|quot;|apos;)[^;]*;")
@@ -37,18 +25,15 @@ _CURLY_QUOTES = frozenset("\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u201f")
 _TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*""")
 _CLOSING_TAG = re.compile(rb"</\s*([^\s>]+)")
 
+_ERRORS = expat.errors
 _HINTS = {
-    expat.errors.codes[
-        expat.errors.XML_ERROR_INVALID_TOKEN
-    ]: "; attributes need quotes, and in values '&' is written '&amp;' and '<' is written '&lt;'",
-    expat.errors.codes[expat.errors.XML_ERROR_SYNTAX]: "; a launch file begins with <launch>",
-    expat.errors.codes[
-        expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT
-    ]: "; everything must stand inside one <launch> tag",
-    expat.errors.codes[expat.errors.XML_ERROR_UNDEFINED_ENTITY]: "; write '&amp;' for '&'",
-    expat.errors.codes[
-        expat.errors.XML_ERROR_UNBOUND_PREFIX
-    ]: "; a prefix needs an xmlns declaration, and launch tags have none",
+    _ERRORS.XML_ERROR_INVALID_TOKEN: "; attributes need quotes, and in values '&' is written"
+    " '&amp;' and '<' is written '&lt;'",
+    _ERRORS.XML_ERROR_SYNTAX: "; a launch file begins with <launch>",
+    _ERRORS.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: "; everything must stand inside one <launch> tag",
+    _ERRORS.XML_ERROR_UNDEFINED_ENTITY: "; write '&amp;' for '&'",
+    _ERRORS.XML_ERROR_UNBOUND_PREFIX: "; a prefix needs an xmlns declaration, and launch tags have"
+    " none",
 }
 
 
@@ -121,8 +106,8 @@ def misplaced(tag: str, parent: str) -> str:
 
 def unknown_attribute(tag: str, attribute: str) -> str:
     """Return the warning about an attribute that a tag does not have."""
-    known = TAGS[tag].attributes
-    hint = near_miss(attribute, known) or f"; it has {', '.join(sorted(known))}"
+    allowed = TAGS[tag].attributes
+    hint = near_miss(attribute, allowed) or f"; it has {', '.join(sorted(allowed))}"
     return f"<{tag}> has no attribute '{attribute}'{hint}"
 
 
@@ -131,11 +116,10 @@ def _listing(names: Iterable[str]) -> str:
 
 
 class TextError(Exception):
-    """An error in a text, such as the value of an attribute.
+    """An error in a text, such as the value of an attribute, at the character of an index.
 
     Attributes:
-        reason: Description of the error, what was expected, and what to do.
-        index: 0-based index of the character where the error is.
+        reason: Description of the error, the expected value, and the remedy.
     """
 
     def __init__(self, reason: str, index: int = 0) -> None:
@@ -148,8 +132,6 @@ class TagError(Exception):
     """An error in an element.
 
     Attributes:
-        element: The element.
-        reason: Description of the error, what was expected, and what to do.
         attribute: Name of the wrong attribute, or None for the element itself.
         index: 0-based index in the value of the attribute.
         place: Path, line and column of the error if it is outside the tag.
@@ -176,9 +158,6 @@ class Element:
     """One XML element.
 
     Attributes:
-        tag: Name as written.
-        attributes: Values by name, with references resolved.
-        children: Child elements in order.
         line: 1-based line of the ``<``.
         column: 1-based column of the ``<``.
         chunks: (text, line, column) of each piece of text, for elements whose text is kept.
@@ -241,13 +220,7 @@ class Element:
 
 
 class Document:
-    """A parsed launch file.
-
-    Attributes:
-        path: Path as messages show it.
-        data: Content of the file.
-        launch: The ``<launch>`` element.
-    """
+    """A parsed launch file."""
 
     def __init__(self, path: str, data: bytes) -> None:
         self.path = path
@@ -320,40 +293,36 @@ class _Handlers:
 
     def explain(self, error: expat.ExpatError) -> LaunchFileError:
         """Return the error for XML that is not well-formed, naming the tag concerned."""
-        reason = expat.errors.messages.get(error.code, str(error))
-        if error.code == expat.errors.codes[expat.errors.XML_ERROR_TAG_MISMATCH] and self.open:
+        reason = _ERRORS.messages.get(error.code, str(error))
+        if reason == _ERRORS.XML_ERROR_TAG_MISMATCH and self.open:
             closing = _CLOSING_TAG.search(self.document.data, self.parser.ErrorByteIndex - 2)
-            found = closing[1].decode("utf-8", "replace") if closing else "?"
+            closed = closing[1].decode("utf-8", "replace") if closing else "?"
             opened = self.open[-1]
             hint = "" if opened.tag in TAGS else near_miss(opened.tag, TAGS)
             hint = hint or f"; expected </{opened.tag}>{_slash(opened.tag)}"
-            reason = f"</{found}> closes <{opened.tag}> of line {opened.line}{hint}"
-        elif error.code == expat.errors.codes[expat.errors.XML_ERROR_NO_ELEMENTS]:
+            reason = f"</{closed}> closes <{opened.tag}> of line {opened.line}{hint}"
+        elif reason == _ERRORS.XML_ERROR_NO_ELEMENTS:
             reason = "the file ends before any tag"
             if self.open:
                 opened = self.open[-1]
                 reason = f"the file ends inside <{opened.tag}> of line {opened.line}"
         else:
-            reason += self._curly_quote(error) or _HINTS.get(error.code, "")
+            reason += self._curly_quote(reason) or _HINTS.get(reason, "")
         return LaunchFileError(
             f"not well-formed XML: {reason}", self.document.path, error.lineno, error.offset + 1
         )
 
-    def _curly_quote(self, error: expat.ExpatError) -> str:
+    def _curly_quote(self, reason: str) -> str:
         """Return a hint if the error is a curly quote from a word processor."""
-        if error.code != expat.errors.codes[expat.errors.XML_ERROR_INVALID_TOKEN]:
+        if reason != _ERRORS.XML_ERROR_INVALID_TOKEN:
             return ""
         start = self.parser.ErrorByteIndex
-        found = self.document.data[start : start + 3].decode("utf-8", "replace")
-        return f'; {found} is not an XML quote: write "' if found in _CURLY_QUOTES else ""
+        character = self.document.data[start : start + 3].decode("utf-8", "replace")
+        return f'; {character} is not an XML quote: write "' if character in _CURLY_QUOTES else ""
 
 
 def parse(path: str, data: bytes) -> Document:
-    """Parse a launch file.
-
-    Args:
-        path: Path to show in messages.
-        data: Content of the file, in any encoding that XML can declare.
+    """Parse a launch file, in any encoding that XML can declare.
 
     Raises:
         LaunchFileError: If the XML is not well-formed, declares an entity that is refused, or

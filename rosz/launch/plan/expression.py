@@ -25,8 +25,8 @@ from typing import Any
 from rosz.errors import near_miss
 from rosz.launch.plan.document import TextError
 
-__all__ = ("evaluate",)
-
+# An expression may come from a file that nobody has read, so neither its time nor its memory may
+# grow without limit: numbers double their digits with each multiplication, and fields are padded.
 _MAX_LENGTH = 10_000
 _MAX_DEPTH = 150
 _MAX_BITS = 4096
@@ -162,16 +162,7 @@ _PYTHON_ERRORS = (ArithmeticError, LookupError, RecursionError, TypeError, Value
 
 
 class _Evaluation:
-    """The evaluation of one expression.
-
-    Args:
-        functions: The functions of launch files by name.
-        arg: Function that returns the value of an arg by name, or None.
-        args: Names of the args, for suggestions.
-
-    Attributes:
-        column: Column of the innermost part that failed, or -1.
-    """
+    """The evaluation of one expression."""
 
     def __init__(
         self,
@@ -184,10 +175,9 @@ class _Evaluation:
         self._args = args
         self._left: float = _MAX_SIZE
         self._depth = 0
-        self.column = -1
+        self.column = -1  # or that of the innermost part that failed
 
     def value(self, node: ast.expr) -> Any:
-        """Return the value of a node of the syntax tree."""
         if self._depth >= _MAX_DEPTH:
             raise _Refused(f"it nests deeper than {_MAX_DEPTH}")
         self._depth += 1
@@ -206,11 +196,10 @@ class _Evaluation:
             raise _Refused(f"it takes more than {_MAX_SIZE} steps or elements")
 
     def _charged(self, value: Any) -> Any:
-        """Charge a value for its size, and return it."""
         self._charge(_size(value, self._left))
         return value
 
-    def _evaluate(self, node: ast.expr) -> Any:  # noqa: C901, PLR0911, PLR0912  # a list
+    def _evaluate(self, node: ast.expr) -> Any:  # noqa: C901, PLR0911  # a list
         match node:
             case ast.Constant(value) if isinstance(value, _VALUES):
                 return value
@@ -229,14 +218,26 @@ class _Evaluation:
                 return self._compare(node)
             case ast.IfExp(test, body, orelse):
                 return self.value(body if self.value(test) else orelse)
-            case ast.List(parts):
-                return [self.value(part) for part in parts]
-            case ast.Tuple(parts):
-                return tuple([self.value(part) for part in parts])
-            case ast.Set(parts):
-                return {self.value(part) for part in parts}
-            case ast.Dict(keys, parts):
-                return {self._key(k): self.value(v) for k, v in zip(keys, parts, strict=True)}
+            case ast.List() | ast.Tuple() | ast.Set() | ast.Dict():
+                return self._collect(node)
+            case ast.Subscript() | ast.Attribute() | ast.Call():
+                return self._access(node)
+            case ast.JoinedStr() | ast.FormattedValue():
+                return self._format(node)
+        name = repr(node.value) if isinstance(node, ast.Constant) else type(node).__name__
+        raise _Refused(f"{_REFUSED.get(type(node), name)} is not available in expressions")
+
+    def _collect(self, node: ast.List | ast.Tuple | ast.Set | ast.Dict) -> Any:
+        if isinstance(node, ast.Dict):
+            pairs = zip(node.keys, node.values, strict=True)
+            return {self._key(key): self.value(part) for key, part in pairs}
+        values = [self.value(part) for part in node.elts]
+        if isinstance(node, ast.List):
+            return values
+        return tuple(values) if isinstance(node, ast.Tuple) else set(values)
+
+    def _access(self, node: ast.Subscript | ast.Attribute | ast.Call) -> Any:
+        match node:
             case ast.Subscript(owner, ast.Slice(lower, upper, step)):
                 bounds = [part and self.value(part) for part in (lower, upper, step)]
                 return self.value(owner)[slice(*bounds)]
@@ -245,20 +246,23 @@ class _Evaluation:
             case ast.Call(ast.Name(name)):
                 return self._call(node, name, self._name(name))
             case ast.Call(ast.Attribute(owner, name) as method):
-                return self._call_method(node, self.value(owner), name, method.end_col_offset)
+                receiver = self.value(owner)
+                self._check_method(receiver, name, method.end_col_offset)
+                return self._call(node, f".{name}", getattr(type(receiver), name), receiver)
             case ast.Call(function):
                 raise _Refused(f"{self.value(function)!r} is not a function")
             case ast.Attribute(owner, name):
                 self._check_method(self.value(owner), name, node.end_col_offset)
                 raise _Refused(f"'.{name}' is a method; it can only be called: .{name}(…)")
-            case ast.JoinedStr(parts):
-                return "".join([self.value(part) for part in parts])
-            case ast.FormattedValue(part, conversion, spec):
-                shown = self.value(part)
-                shown = repr(shown) if conversion in {ord("r"), ord("a")} else shown
-                return self._run("format", format, shown, self.value(spec) if spec else "")
-        found = repr(node.value) if isinstance(node, ast.Constant) else type(node).__name__
-        raise _Refused(f"{_REFUSED.get(type(node), found)} is not available in expressions")
+
+    def _format(self, node: ast.JoinedStr | ast.FormattedValue) -> Any:
+        if isinstance(node, ast.JoinedStr):
+            return "".join([self.value(part) for part in node.values])
+        shown = self.value(node.value)
+        if node.conversion in {ord("r"), ord("a")}:
+            shown = repr(shown)
+        spec = self.value(node.format_spec) if node.format_spec else ""
+        return self._run("format", format, shown, spec)
 
     def _name(self, name: str) -> Any:
         if name in self._functions:
@@ -268,8 +272,8 @@ class _Evaluation:
             value = _BUILTINS.get(name)
         if value is not None:
             return value
-        known = [*_MATH, *self._functions, *_BUILTINS]
-        hint = near_miss(name, self._args) or near_miss(name, known)
+        available = [*_MATH, *self._functions, *_BUILTINS]
+        hint = near_miss(name, self._args) or near_miss(name, available)
         if name == "math":
             hint = "; use the names of math alone: write 'pi', not 'math.pi'"
         raise _Refused(f"'{name}' is not an arg of this file and not a function{hint}")
@@ -307,12 +311,8 @@ class _Evaluation:
         allowed = _METHODS.get(type(owner), set())
         if name not in allowed:
             self.column = column or 0
-            known = f"; it has {', '.join(sorted(allowed))}" if allowed else ""
-            raise _Refused(f"'.{name}' of a {type(owner).__name__} is not available{known}")
-
-    def _call_method(self, node: ast.Call, owner: Any, name: str, column: int | None) -> Any:
-        self._check_method(owner, name, column)
-        return self._call(node, f".{name}", getattr(type(owner), name), owner)
+            listing = f"; it has {', '.join(sorted(allowed))}" if allowed else ""
+            raise _Refused(f"'.{name}' of a {type(owner).__name__} is not available{listing}")
 
     def _call(self, node: ast.Call, name: str, function: Any, *owner: Any) -> Any:
         if not callable(function):
@@ -325,10 +325,10 @@ class _Evaluation:
         if any(keyword.arg is None for keyword in node.keywords):
             raise _Refused("'**' is not available in expressions")
         kwargs = {
-            str(one.arg): self._function(one.value)
-            if one.arg == "key" and function in (max, min, sorted)
-            else self.value(one.value)
-            for one in node.keywords
+            str(given.arg): self._function(given.value)
+            if given.arg == "key" and function in (max, min, sorted)
+            else self.value(given.value)
+            for given in node.keywords
         }
         return self._run(name, function, *args, **kwargs)
 

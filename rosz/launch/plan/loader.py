@@ -30,8 +30,6 @@ from rosz.launch.plan.scope import Scope, make_global
 from rosz.launch.plan.substitution import Substitution
 from rosz.launch.plan.tag import Tag
 
-__all__ = ("MAX_INCLUDES", "describe_args", "plan")
-
 MAX_INCLUDES = 300
 """Maximum depth of includes, about that of roslaunch."""
 
@@ -55,14 +53,14 @@ def plan(
         context: The system around the launch.
         ns: Namespace to begin in: ``__ns``, otherwise ``ROS_NAMESPACE``.
         faults: List for the error of each tag that is refused, and then left out; the first one is
-            raised when not given. What follows a refused ``<arg>`` may depend on it, so its error
+            raised when not given. Later tags may depend on a refused ``<arg>``, so its error
             is always raised.
         assign_machines: Whether every node is assigned to its machine, which has to be declared.
 
     Raises:
         LaunchFileError: If a file is refused, or cannot be read.
     """
-    loader = _Loader(context, args, ns, faults=faults)
+    loader = _LaunchLoader(context, args, ns, faults=faults)
     for file in files:
         loader.load(file)
     return loader.finish(assign_machines=assign_machines)
@@ -80,7 +78,7 @@ def describe_args(
     Raises:
         LaunchFileError: If a file is refused, or cannot be read.
     """
-    loader = _Loader(context, args, ns, args_only=True)
+    loader = _LaunchLoader(context, args, ns, args_only=True)
     for file in files:
         loader.load(file)
     return tuple(loader.docs.values())
@@ -96,7 +94,7 @@ class _Frame(msgspec.Struct):
     leave: Callable[[], None] | None = None
 
 
-class _Loader:
+class _LaunchLoader:
     """Reads files into one plan."""
 
     def __init__(
@@ -131,7 +129,6 @@ class _Loader:
         return self.builder.build(unused, assign_machines=assign_machines)
 
     def load(self, file: str | Path | LaunchText) -> None:
-        """Read one file into the plan."""
         self._chain = ()
         self.builder.default_machine = ""
         if isinstance(file, LaunchText):
@@ -195,8 +192,10 @@ class _Loader:
             reader(self, tag)
 
     def _tag(self, element: Element, scope: Scope) -> Tag:
-        places = tuple(place for place, _ in self._chain)
-        return Tag(element, scope, self._substitution, self._warn, self._refuse, places)
+        return Tag(element, scope, self._substitution, self._warn, self._refuse, self._places())
+
+    def _places(self) -> tuple[str, ...]:
+        return tuple(place for place, _ in self._chain)
 
     def _launch(self, element: Element, scope: Scope) -> None:
         """Read the attributes of a ``<launch>``; conditions on it do nothing, as in roslaunch."""
@@ -218,10 +217,8 @@ class _Loader:
         if value is not None and default is not None:
             tag.fail("<arg> has both 'value' and 'default'; keep one", "default")
         doc = tag.alias("doc", "description")
-        try:
+        with tag.refusing("name"):
             tag.scope.declare(name, value, default)
-        except TextError as error:
-            tag.fail(error.reason, "name")
         self._declared.add(name)
         if len(self._stack) == 1 and not value:
             self.docs[name] = ArgDoc(name, doc, default)
@@ -233,16 +230,14 @@ class _Loader:
     def read_group(self, tag: Tag) -> None:
         tag.check()
         scope = self._open(tag, read_namespace(tag))
-        scope.private = list(scope.private)
+        scope.private = dict(scope.private)
         scope.waits = (*scope.waits, *read_wait(tag, scope.ns))
         read_container(tag, scope)
         self._stack.append(_Frame(iter(tag.element.children), scope, self._chain, root="group"))
 
     def _open(self, tag: Tag, ns: str | None, *, include: bool = False) -> Scope:
-        try:
+        with tag.refusing("ns"):
             scope = tag.scope.include(ns) if include else tag.scope.child(ns)
-        except TextError as error:
-            tag.fail(error.reason, "ns")
         if tag.get("clear_params") and tag.flag("clear_params"):
             if not ns:
                 tag.fail("'clear_params' needs 'ns'", "clear_params")
@@ -251,10 +246,8 @@ class _Loader:
 
     def read_push_namespace(self, tag: Tag) -> None:
         tag.check()
-        try:
+        with tag.refusing("namespace"):
             tag.scope.ns = tag.scope.child(tag.require("namespace")).ns
-        except TextError as error:
-            tag.fail(error.reason, "namespace")
 
     def read_include(self, tag: Tag) -> None:
         tag.check()
@@ -266,10 +259,8 @@ class _Loader:
                 scope.declare(name, value, None)
             scope.lenient = True
         self._read_passed(tag, scope)
-        try:
+        with tag.refusing():
             passed = scope.enter()
-        except TextError as error:
-            tag.fail(error.reason)
         document = self._include(tag, path)
         scope.file = path
         chain = self._chain
@@ -288,7 +279,6 @@ class _Loader:
         self._stack.append(_Frame(iter(document.launch.children), scope, self._chain, leave=leave))
 
     def _read_passed(self, tag: Tag, scope: Scope) -> None:
-        """Read the ``<arg>`` and ``<env>`` tags inside an ``<include>``."""
         for element in tag.element.children:
             inner = tag.inside(element, scope)
             if inner.name not in {"arg", "env"}:
@@ -318,20 +308,18 @@ class _Loader:
         except LaunchFileError as error:
             if path.endswith((".py", ".yaml", ".yml")):
                 tag.fail(f"'{path}' is not XML; launch files are read as XML only", "file")
-            places = (*(place for place, _ in self._chain), str(tag.place))
+            places = (*self._places(), str(tag.place))
             raise LaunchFileError(
                 error.reason, error.path, error.line, error.column, _shorten(places)
             ) from None
 
     def _warn(self, element: Element, text: str, attribute: str | None, index: int) -> None:
         line, column = element.locate(attribute, index)
-        places = tuple(place for place, _ in self._chain)
-        self.builder.warnings.append(Notice(text, Place(element.file, line, column, places)))
+        place = Place(element.file, line, column, self._places())
+        self.builder.warnings.append(Notice(text, place))
 
     def _refuse(self, error: TagError) -> None:
-        """Keep the error of a tag, or raise it."""
-        places = tuple(place for place, _ in self._chain)
-        element = error.element
+        places, element = self._places(), error.element
         path, line, column = element.file, *element.locate(error.attribute, error.index)
         if error.place is not None:
             if error.place[0] != path:
@@ -352,18 +340,18 @@ def _shorten(places: tuple[str, ...]) -> tuple[str, ...]:
     return (*places[:half], f"… {len(places) - 2 * half} more", *places[-half:])
 
 
-_READERS: Mapping[str, Callable[[_Loader, Tag], None]] = {
-    "arg": _Loader.read_arg,
+_READERS: Mapping[str, Callable[[_LaunchLoader, Tag], None]] = {
+    "arg": _LaunchLoader.read_arg,
     "env": lambda _, tag: tag.env(tag.scope),
     "executable": lambda loader, tag: read_executable(tag, loader.builder),
-    "group": _Loader.read_group,
-    "include": _Loader.read_include,
-    "let": _Loader.read_let,
+    "group": _LaunchLoader.read_group,
+    "include": _LaunchLoader.read_include,
+    "let": _LaunchLoader.read_let,
     "machine": lambda loader, tag: read_machine(tag, loader.builder),
     "node": lambda loader, tag: read_node(tag, loader.builder),
     "param": lambda loader, tag: read_param(tag, loader.builder),
-    "push-ros-namespace": _Loader.read_push_namespace,
-    "push_ros_namespace": _Loader.read_push_namespace,
+    "push-ros-namespace": _LaunchLoader.read_push_namespace,
+    "push_ros_namespace": _LaunchLoader.read_push_namespace,
     "remap": lambda _, tag: tag.remap(tag.scope),
     "rosparam": lambda loader, tag: read_rosparam(tag, loader.builder),
     "set_env": lambda _, tag: tag.env(tag.scope),

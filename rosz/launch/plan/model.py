@@ -19,21 +19,6 @@ from rosz.launch.plan.document import TextError
 from rosz.launch.plan.scope import join
 from rosz.params import normalise
 
-__all__ = (
-    "ArgDoc",
-    "Condition",
-    "MachinePlan",
-    "NodePlan",
-    "Notice",
-    "ParamPlan",
-    "Place",
-    "Plan",
-    "PlanBuilder",
-    "SetupPlan",
-    "TestPlan",
-    "Wait",
-)
-
 _RESERVED = "/rosout"
 
 
@@ -292,11 +277,11 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         Raises:
             NotFoundError: If there is none.
         """
-        known = {node.full_name: node for node in reversed(self.processes)}
-        if name in known:
-            return known[name]
-        listing = f"; the nodes are {', '.join(sorted(known))}" if known else "; there are no nodes"
-        raise NotFoundError(f"no node '{name}' in this launch{near_miss(name, known) or listing}")
+        nodes = {node.full_name: node for node in reversed(self.processes)}
+        if name in nodes:
+            return nodes[name]
+        listing = f"; the nodes are {', '.join(sorted(nodes))}" if nodes else "; there are no nodes"
+        raise NotFoundError(f"no node '{name}' in this launch{near_miss(name, nodes) or listing}")
 
     @property
     def processes(self) -> tuple[NodePlan, ...]:
@@ -314,8 +299,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         for machine in self.machines:
             if machine.name == name:
                 return machine
-        known = [machine.name for machine in self.machines]
-        raise NotFoundError(f"no machine '{name}' in this launch{near_miss(name, known)}")
+        declared = [machine.name for machine in self.machines]
+        raise NotFoundError(f"no machine '{name}' in this launch{near_miss(name, declared)}")
 
     def to_json(self) -> bytes:
         """Return the plan as JSON: fields by name, tuples as lists, bytes as base64."""
@@ -325,15 +310,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 class PlanBuilder:
     """Collects the parts of a plan while tags are read.
 
-    Args:
-        context: The system around the launch.
-
     Attributes:
-        context: The system around the launch.
         files: Absolute paths of the files read, as keys in order.
-        setup: ``<rosparam>`` dumps and deletes.
-        warnings: Warnings.
-        deprecations: Texts of ``deprecated``.
+        tests: The tests, of which two may have the same name.
         default_machine: Name of the machine for nodes that name none.
     """
 
@@ -349,7 +328,7 @@ class PlanBuilder:
         self._child_of: dict[str, str] = {}
         self._machines: dict[str, MachinePlan] = {}
         self._nodes: dict[str, NodePlan] = {}
-        self._tests: list[TestPlan] = []
+        self.tests: list[TestPlan] = []
         self._used: dict[MachinePlan, str] = {}
 
     def clear(self, ns: str) -> None:
@@ -372,9 +351,9 @@ class PlanBuilder:
         parent = name
         while len(parent) > 1:
             parent = parent.rpartition("/")[0] or "/"
-            known = self._params.get(parent)
-            if known is not None:
-                text = f"parameter '{name}' turns '{parent}', set at {known.place}, into a dict"
+            above = self._params.get(parent)
+            if above is not None:
+                text = f"parameter '{name}' turns '{parent}', set at {above.place}, into a dict"
                 self.warnings.append(Notice(text, place))
             self._child_of[parent] = name
         if name in self._child_of and name not in self._params:
@@ -403,10 +382,10 @@ class PlanBuilder:
         Raises:
             TextError: If the name is empty, or used by a machine that differs.
         """
-        known = self._machines.setdefault(machine.name, machine)
-        same = _config(known) == _config(machine) and known.assignable == machine.assignable
+        other = self._machines.setdefault(machine.name, machine)
+        same = _config(other) == _config(machine) and other.assignable == machine.assignable
         if not machine.name or not same:
-            where = f", at {known.place}" if machine.name else ""
+            where = f", at {other.place}" if machine.name else ""
             raise TextError(f"machine '{machine.name}' is declared already, and differs{where}")
 
     def add_node(self, node: NodePlan) -> None:
@@ -418,16 +397,12 @@ class PlanBuilder:
         name = node.full_name
         if name == _RESERVED:
             raise TextError(f"'{name}' is the name of ROS's own log collector; choose another")
-        known = self._nodes.setdefault(name, node)
-        if known is not node:
+        other = self._nodes.setdefault(name, node)
+        if other is not node:
             raise TextError(
-                f"two nodes are named '{name}', the other at {known.place}; "
+                f"two nodes are named '{name}', the other at {other.place}; "
                 "give one another name or namespace"
             )
-
-    def add_test(self, test: TestPlan) -> None:
-        """Add a test; two tests may have the same name."""
-        self._tests.append(test)
 
     def unused_name(self, ns: str, base: str) -> str:
         """Return a base name that no node in a namespace has yet."""
@@ -440,15 +415,11 @@ class PlanBuilder:
     def build(self, unused_args: tuple[str, ...], *, assign_machines: bool = True) -> Plan:
         """Return the plan.
 
-        Args:
-            unused_args: Names of the args given that no file declares.
-            assign_machines: Whether to assign every node to its machine.
-
         Raises:
             LaunchFileError: If a node names a machine that is not declared, or a container has the
                 name of a node.
         """
-        nodes, tests = list(self._nodes.values()), self._tests
+        nodes, tests = list(self._nodes.values()), self.tests
         for node in nodes:
             self._check_container(node)
         if assign_machines:
@@ -470,14 +441,10 @@ class PlanBuilder:
     def _check_container(self, node: NodePlan) -> None:
         other = self._nodes.get(node.container)
         if other is not None:
-            place = node.place
-            raise LaunchFileError(
+            raise _error(
                 f"container '{node.container}' of node '{node.full_name}' has the name of the node"
                 f" at {other.place}; give one of them another name",
-                place.file,
-                place.line,
-                place.column,
-                place.includes,
+                node.place,
             )
 
     def _assign_machine(self, node: NodePlan) -> NodePlan:
@@ -487,19 +454,16 @@ class PlanBuilder:
         machine = self._machines.get(node.machine)
         if machine is None:
             hint = near_miss(node.machine, self._machines) or "; declare it with <machine>"
-            place = node.place
-            raise LaunchFileError(
-                f"machine '{node.machine}' is not declared{hint}",
-                place.file,
-                place.line,
-                place.column,
-                place.includes,
-            )
+            raise _error(f"machine '{node.machine}' is not declared{hint}", node.place)
         return replace(node, machine=self._used.setdefault(_config(machine), machine.name))
 
     def _parent_cleared(self, ns: str) -> bool:
         above = (f"{other.rstrip('/')}/" for other in self._clear if other != ns)
         return any(ns.startswith(parent) for parent in above)
+
+
+def _error(reason: str, place: Place) -> LaunchFileError:
+    return LaunchFileError(reason, place.file, place.line, place.column, place.includes)
 
 
 def _config(machine: MachinePlan) -> MachinePlan:

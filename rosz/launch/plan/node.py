@@ -1,10 +1,12 @@
 """The tags that describe processes: ``<node>``, ``<test>``, ``<executable>`` and ``<machine>``.
 
-``wait_for``, an addition to roslaunch, names what must exist before a node starts:
+``wait_for``, an addition to roslaunch, names things that must exist before a node starts:
 ``wait_for="topic /scan"`` waits for one thing; a comma adds another, and ``|`` separates
 alternatives, as in ``topic /scan, service /reset | param /ready``. The kinds are topic, service,
 param and node; names are resolved as the node would resolve them. ``wait_timeout`` is in seconds,
 30 by default. On a group, both concern every node in it, and each node may add its own.
+
+Every function that reads a tag raises `TagError` if the tag, or one inside it, is wrong.
 """
 
 from __future__ import annotations
@@ -17,21 +19,11 @@ from msgspec.structs import replace
 
 from rosz import names
 from rosz.errors import InvalidName, near_miss
-from rosz.launch.plan.document import TagError, TextError, misplaced
+from rosz.launch.plan.document import TagError, misplaced
 from rosz.launch.plan.model import Condition, MachinePlan, NodePlan, PlanBuilder, TestPlan, Wait
 from rosz.launch.plan.param import read_param, read_rosparam
 from rosz.launch.plan.scope import Scope, join
 from rosz.launch.plan.tag import Tag
-
-__all__ = (
-    "read_container",
-    "read_executable",
-    "read_machine",
-    "read_namespace",
-    "read_node",
-    "read_test",
-    "read_wait",
-)
 
 _DEFAULT_TIME_LIMIT = 60.0
 _DEFAULT_WAIT = 30.0
@@ -46,11 +38,7 @@ _KINDS: dict[str, _Kind] = {kind: kind for kind in get_args(_Kind)}
 
 
 def read_namespace(tag: Tag) -> str | None:
-    """Return the ``ns`` of a tag, or None if it is absent.
-
-    Raises:
-        TagError: If it is empty.
-    """
+    """Return the ``ns`` of a tag, or None if it is absent."""
     ns = tag.alias("ns", "namespace")
     if ns is not None and not ns:
         tag.fail("'ns' is empty; leave it out, or write '/' for the root", "ns")
@@ -58,11 +46,7 @@ def read_namespace(tag: Tag) -> str | None:
 
 
 def read_container(tag: Tag, scope: Scope) -> None:
-    """Read ``container`` and ``by_reference`` of a ``<group>`` into its scope.
-
-    Raises:
-        TagError: The name is not valid, or there is only ``by_reference``.
-    """
+    """Read ``container`` and ``by_reference`` of a ``<group>`` into its scope."""
     name = tag.get("container")
     if name is not None:
         try:
@@ -83,9 +67,6 @@ def read_node(tag: Tag, builder: PlanBuilder) -> None:
 
     With ROS 2's ``exec`` in place of ``type`` the name may be left out. It is then the name of the
     executable; ROS 2 leaves it to the program.
-
-    Raises:
-        TagError: If an attribute or a child is wrong, or another node has the name.
     """
     tag.check()
     if "name" in tag.element.attributes or "type" in tag.element.attributes:
@@ -93,18 +74,12 @@ def read_node(tag: Tag, builder: PlanBuilder) -> None:
     else:
         name = _valid_name(tag.require("type", "exec").partition(".")[0])
     node = _read_node(tag, builder, name)
-    try:
+    with tag.refusing("name"):
         builder.add_node(node)
-    except TextError as error:
-        tag.fail(error.reason, "name")
 
 
 def read_test(tag: Tag, builder: PlanBuilder) -> None:
-    """Read ``<test>``.
-
-    Raises:
-        TagError: If an attribute or a child is wrong.
-    """
+    """Read ``<test>``."""
     for attribute in ("respawn", "respawn_delay", "output"):
         if attribute in tag.element.attributes:
             tag.fail(f"a <test> cannot have '{attribute}'", attribute)
@@ -117,16 +92,13 @@ def read_test(tag: Tag, builder: PlanBuilder) -> None:
     retry = tag.whole("retry", 0, -math.inf) or 0
     # A test run ends with each test, so 'required' has no meaning there.
     node = replace(_read_node(tag, builder, name), required=False)
-    builder.add_test(TestPlan(node, test_name, limit, retry))
+    builder.tests.append(TestPlan(node, test_name, limit, retry))
 
 
 def read_executable(tag: Tag, builder: PlanBuilder) -> None:
     """Read ROS 2's ``<executable>``, a program that is not a ROS node.
 
     ``cmd`` is split as a shell does, but not run by one; ``shell`` is not supported.
-
-    Raises:
-        TagError: If an attribute or a child is wrong, or another process has the name.
     """
     tag.check()
     tag.require("cmd")
@@ -155,14 +127,13 @@ def read_executable(tag: Tag, builder: PlanBuilder) -> None:
         env=tuple(scope.env),
         wait_for=(*scope.waits, *read_wait(tag, scope.ns, name or base)),
     )
-    try:
-        builder.add_node(_with_start(tag, node))
-    except TextError as error:
-        tag.fail(error.reason, "name")
+    node = _with_start(tag, node)
+    with tag.refusing("name"):
+        builder.add_node(node)
 
 
 def _with_start(tag: Tag, node: NodePlan) -> NodePlan:
-    """Return a node with the attributes that say how it starts and what its end means."""
+    """Return a node with the attributes about its start and its end."""
     respawn, required = tag.flag("respawn"), tag.flag("required")
     if respawn and required:
         tag.fail("'respawn' and 'required' cannot both be true", "required")
@@ -214,16 +185,13 @@ def _read_node(tag: Tag, builder: PlanBuilder, name: str) -> NodePlan:
 
 
 def _open_scopes(tag: Tag, builder: PlanBuilder, name: str) -> tuple[Scope, Scope]:
-    """Return the scope of a node and the scope of its params."""
     ns = read_namespace(tag)
     if name.startswith("~"):
         tag.fail(f"node name '{name}' starts with '~', as only names within a node do", "name")
-    try:
+    with tag.refusing("ns" if ns else "name"):
         own = tag.scope.child(ns)
         params = own.child(name)
-    except TextError as error:
-        tag.fail(error.reason, "ns" if ns else "name")
-    params.private = []
+    params.private = {}
     if tag.get("clear_params") and tag.flag("clear_params"):
         if not name:
             tag.fail("'clear_params' needs a node with a name", "clear_params")
@@ -234,42 +202,32 @@ def _open_scopes(tag: Tag, builder: PlanBuilder, name: str) -> tuple[Scope, Scop
 def _read_children(
     tag: Tag, builder: PlanBuilder, params: Scope, remaps: Scope, env: Scope
 ) -> None:
+    scopes = {"remap": tag.scope, "param": params, "rosparam": params, "env": env}
     for element in tag.element.children:
+        name = element.tag.lower()
+        inner = tag.inside(element, scopes.get(name, tag.scope))
         try:
-            match element.tag.lower():
-                case "remap":
-                    inner = tag.inside(element, tag.scope)
-                    if inner.wanted():
-                        inner.remap(remaps)
-                case "param" | "rosparam":
-                    _read_parameters(tag.inside(element, params), builder)
-                case "env":
-                    inner = tag.inside(element, env)
-                    if inner.wanted():
-                        inner.env(env)
-                case _:
-                    outer = tag.inside(element, tag.scope)
-                    outer.warn(misplaced(element.tag, tag.name))
+            if name not in scopes:
+                inner.warn(misplaced(element.tag, tag.name))
+            elif not inner.wanted():
+                continue
+            elif name == "remap":
+                inner.remap(remaps)
+            elif name == "env":
+                inner.env(env)
+            elif name == "param":
+                read_param(inner, builder, in_node=True)
+            else:
+                read_rosparam(inner, builder)
         except TagError as error:
             tag.refuse(error)
 
 
-def _read_parameters(tag: Tag, builder: PlanBuilder) -> None:
-    if not tag.wanted():
-        return
-    if tag.name == "param":
-        read_param(tag, builder, in_node=True)
-    else:
-        read_rosparam(tag, builder)
-
-
 def _add_private(tag: Tag, builder: PlanBuilder, params: Scope) -> None:
     """Add the ``~params`` of the scope around a node, then the node's own."""
-    for name, value, place in [*tag.scope.private, *params.private]:
-        try:
+    for name, (value, place) in [*tag.scope.private.items(), *params.private.items()]:
+        with tag.refusing():
             builder.add_param(params.ns + name.removeprefix("~"), value, place)
-        except TextError as error:
-            tag.fail(error.reason)
 
 
 def _check_words(tag: Tag, package: str, type_name: str, name: str) -> None:
@@ -295,7 +253,6 @@ def _read_cwd(tag: Tag) -> str:
 
 
 def _valid_name(text: str) -> str:
-    """Return a valid base name made from a text."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", text)
     return name if re.match("[A-Za-z]", name) else f"node_{name}"
 
@@ -308,16 +265,7 @@ def _positive(tag: Tag, attribute: str, default: float) -> float:
 
 
 def read_wait(tag: Tag, ns: str, node: str = "") -> tuple[Wait, ...]:
-    """Read ``wait_for`` and ``wait_timeout``.
-
-    Args:
-        tag: The tag that may have them.
-        ns: Namespace of relative names, with a trailing slash.
-        node: Base name of the node, for private names; empty for a group.
-
-    Raises:
-        TagError: If a condition or the timeout is wrong.
-    """
+    """Read ``wait_for`` and ``wait_timeout``; a group has no node, and so no private names."""
     text = tag.get("wait_for")
     if text is None:
         if "wait_timeout" in tag.element.attributes:
@@ -337,9 +285,9 @@ def read_wait(tag: Tag, ns: str, node: str = "") -> tuple[Wait, ...]:
 def _read_condition(tag: Tag, words: list[str], ns: str, node: str) -> Condition:
     kind, name = words if len(words) == 2 else ("", "")  # noqa: PLR2004  # a kind and a name
     if not kind:
-        found = " ".join(words)
+        written = " ".join(words)
         expected = "expected a kind and a name, as in 'topic /scan'"
-        tag.fail(f"'wait_for' has '{found}'; {expected}", "wait_for")
+        tag.fail(f"'wait_for' has '{written}'; {expected}", "wait_for")
     if kind not in _KINDS:
         hint = near_miss(kind, _KINDS) or f"; there are {', '.join(_KINDS)}"
         tag.fail(f"'wait_for' has no kind '{kind}'{hint}", "wait_for")
@@ -352,11 +300,7 @@ def _read_condition(tag: Tag, words: list[str], ns: str, node: str) -> Condition
 
 
 def read_machine(tag: Tag, builder: PlanBuilder) -> None:
-    """Read ``<machine>``.
-
-    Raises:
-        TagError: If an attribute is missing or wrong, or another machine has the name.
-    """
+    """Read ``<machine>``."""
     for old in _OLD_MACHINE:
         if tag.get(old):
             tag.fail(f"'{old}' is no longer supported; let 'env-loader' set the environment", old)
@@ -384,9 +328,7 @@ def read_machine(tag: Tag, builder: PlanBuilder) -> None:
         assignable=default != "never",
         place=tag.place,
     )
-    try:
+    with tag.refusing("name"):
         builder.add_machine(machine)
-    except TextError as error:
-        tag.fail(error.reason, "name")
     if default == "true":
         builder.default_machine = name

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 from rosz import names
 from rosz.errors import LaunchError, ParamError, YamlError, near_miss
@@ -12,20 +13,11 @@ from rosz.launch.plan.context import LaunchContext
 from rosz.launch.plan.document import TagError, TextError
 from rosz.launch.plan.model import PlanBuilder, SetupPlan
 from rosz.launch.plan.scope import join
-from rosz.launch.plan.substitution import guess_type
+from rosz.launch.plan.substitution import guess_type, parse_bool
 from rosz.launch.plan.tag import Tag
-
-__all__ = ("read_param", "read_rosparam")
 
 _SOURCES = ("value", "textfile", "binfile", "command")
 _COMMANDS = ("load", "dump", "delete")
-
-
-def _parse_bool(text: str) -> bool:
-    lower = text.lower().strip()
-    if lower not in {"true", "1", "false", "0"}:
-        raise ValueError(f"'{text}' is not a bool; expected true, false, 1 or 0")
-    return lower in {"true", "1"}
 
 
 def _parse_number(convert: Callable[[str], float], noun: str, text: str) -> float:
@@ -51,8 +43,8 @@ def _load_yaml(text: str, *, null_as_empty: bool = False) -> Any:
 
 _TYPES: Mapping[str, Callable[[str], Any]] = {
     "auto": guess_type,
-    "bool": _parse_bool,
-    "boolean": _parse_bool,
+    "bool": parse_bool,
+    "boolean": parse_bool,
     "double": partial(_parse_number, float, "a double"),
     "int": partial(_parse_number, int, "an int"),
     "str": str,
@@ -72,17 +64,15 @@ def read_param(tag: Tag, builder: PlanBuilder, *, in_node: bool = False) -> None
     tag.check()
     given = [source for source in _SOURCES if source in tag.element.attributes]
     if len(given) != 1:
-        found = f"has {' and '.join(given)}" if given else "has none"
-        tag.fail(f"<param> takes one of {', '.join(_SOURCES)}; this one {found}")
+        sources = f"has {' and '.join(given)}" if given else "has none"
+        tag.fail(f"<param> takes one of {', '.join(_SOURCES)}; this one {sources}")
     name = tag.require("name").strip()
     value = _read_value(tag, builder.context, given[0])
     if in_node or name.startswith("~"):
         tag.scope.add_private(names.canonical(name), value, tag.place)
         return
-    try:
+    with tag.refusing("name"):
         builder.add_param(join(tag.scope.ns, name), value, tag.place)
-    except TextError as error:
-        tag.fail(error.reason, "name")
 
 
 def _read_value(tag: Tag, context: LaunchContext, source: str) -> Any:
@@ -154,14 +144,17 @@ def read_rosparam(tag: Tag, builder: PlanBuilder) -> None:
     if command == "load":
         _load(tag, builder, name, file, substitute=substitute, named=bool(param))
         return
-    if command == "delete" and file is not None:
-        tag.fail("command='delete' takes no file", "file")
-    if command == "dump" and not file:
-        tag.fail("command='dump' needs a file", "file" if file is not None else "command")
     if name.startswith("~"):
         name = f"/rosparam/{name[1:]}"
-    action: Literal["dump", "delete"] = "dump" if command == "dump" else "delete"
-    builder.setup.append(SetupPlan(action, names.canonical(name), file or "", tag.place))
+    if command == "delete":
+        if file is not None:
+            tag.fail("command='delete' takes no file", "file")
+        step = SetupPlan("delete", names.canonical(name), "", tag.place)
+    else:
+        if not file:
+            tag.fail("command='dump' needs a file", "command" if file is None else "file")
+        step = SetupPlan("dump", names.canonical(name), file, tag.place)
+    builder.setup.append(step)
 
 
 def _load(
@@ -174,30 +167,31 @@ def _load(
         if not file:
             tag.fail("'file' is empty", "file")
         text = _decode(tag, _read_file(tag, builder.context, file, "file"), "file")
-    try:
-        text = tag.substitute(text) if substitute else text
-    except TextError as error:
-        before = text[: error.index]
-        line, column = before.count("\n"), error.index - before.rfind("\n") - 1
-        raise _locate(tag, file, error.reason, line, column) from error
-    try:
-        value = _load_yaml(text, null_as_empty=True)
-    except YamlError as error:
-        line, column = max(error.line - 1, 0), max(error.column - 1, 0)
-        raise _locate(tag, file, error.reason, line, column) from error
-    try:
-        found = assign(value, name)
-    except ParamError as error:
-        raise _locate(tag, file, str(error), 0, 0) from error
+    with _located(tag, file, text):
+        value = _load_yaml(tag.substitute(text) if substitute else text, null_as_empty=True)
+        parameters = assign(value, name)
     if not named and not isinstance(value, dict):
         tag.fail(
             f"<rosparam> without 'param' needs a dict, got {type(value).__name__}: {value!r:.60}"
         )
-    try:
-        for space, inner in found:
+    with _located(tag, file):
+        for space, inner in parameters:
             builder.add_params(space, inner, tag.place)
+
+
+@contextmanager
+def _located(tag: Tag, file: str | None, text: str = "") -> Iterator[None]:
+    """Refuse the launch file for an error in a block, with its place in the YAML."""
+    try:
+        yield
     except TextError as error:
-        raise _locate(tag, file, error.reason, 0, 0) from error
+        *before, last = text[: error.index].split("\n")
+        raise _locate(tag, file, error.reason, len(before), len(last)) from error
+    except YamlError as error:
+        line, column = max(error.line - 1, 0), max(error.column - 1, 0)
+        raise _locate(tag, file, error.reason, line, column) from error
+    except ParamError as error:
+        raise _locate(tag, file, str(error), 0, 0) from error
 
 
 def _locate(tag: Tag, file: str | None, reason: str, line: int, column: int) -> TagError:

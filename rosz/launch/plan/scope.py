@@ -1,7 +1,7 @@
 """The nested scopes of a launch file, by roslaunch's rules.
 
-Each file, group and node has its own scope. A scope sees what was declared before it, and what is
-declared in it stays in it, with two exceptions:
+Each file, group and node has its own scope. A scope sees the declarations before it, and its own
+stay in it, with two exceptions:
 
 - ``~params`` of an included file reach the includer if it already had some (`Scope.private`).
 - An included file sees only the args passed to it, and has its own anonymous names.
@@ -14,29 +14,18 @@ from typing import Any
 from rosz import names
 from rosz.launch.plan.document import TextError
 
-__all__ = ("Scope", "join", "make_global")
-
 
 class Scope:
     """The declarations visible at one point of a launch file.
 
-    Args:
-        ns: Namespace, relative or global.
-        file: Path of the file, as it was given or included.
-
     Attributes:
         ns: Global namespace with a trailing slash.
-        args: Values of args by name.
-        declared: Names of the declared args, in order.
         anonymous: Names made by ``$(anon)``, by base name.
         env: (name, value) of environment variables, in order.
         environ: Those of ``<set_env>``, which ``$(env)`` and ``$(optenv)`` see as well.
-        private: ``~params`` for the following nodes: (name, value, origin).
+        private: ``~params`` for the following nodes: (value, origin) by name, in order.
         waits: Conditions that the following nodes wait for.
-        container: Full name of the container of the following nodes, or "".
-        by_reference: Whether nodes of rospy in it pass on messages themselves.
         remaps: (from, to) in order, those of outer scopes first; no name twice.
-        included: Whether the file was included by another.
         incoming: Args passed to an include while its tag is read, otherwise None.
         lenient: Whether args may be set twice, as ``pass_all_args`` allows.
     """
@@ -49,7 +38,7 @@ class Scope:
         self.anonymous: dict[str, str] = {}
         self.env: list[tuple[str, str]] = []
         self.environ: dict[str, str] = {}
-        self.private: list[tuple[str, Any, Any]] = []
+        self.private: dict[str, tuple[Any, Any]] = {}
         self.waits: tuple[Any, ...] = ()
         self.included: bool = False
         self.incoming: dict[str, str] | None = None
@@ -59,10 +48,7 @@ class Scope:
         self.remaps: list[tuple[str, str]] = []
 
     def child(self, ns: str | None = None) -> Scope:
-        """Return a scope inside this one.
-
-        Args:
-            ns: Namespace of the new scope, or None for the namespace of this one.
+        """Return a scope inside this one, by default in the same namespace.
 
         Raises:
             TextError: If the namespace is private.
@@ -74,7 +60,7 @@ class Scope:
         scope.env = list(self.env)
         scope.environ = dict(self.environ)
         # Not a copy unless empty: in roslaunch, nodes see such params from included files.
-        scope.private = self.private or []
+        scope.private = self.private or {}
         scope.waits = self.waits
         scope.container = self.container
         scope.by_reference = self.by_reference
@@ -143,14 +129,13 @@ class Scope:
             raise TextError("a remap needs two names, and one is empty")
         for name in pair:
             names.check(name)
-        self.remaps = [known for known in self.remaps if known[0] != pair[0]]
+        self.remaps = [earlier for earlier in self.remaps if earlier[0] != pair[0]]
         self.remaps.append(pair)
 
     def add_private(self, name: str, value: Any, origin: Any) -> None:
-        """Add a ``~param``; it replaces an earlier one of the same name."""
-        for known in [entry for entry in self.private if entry[0] == name]:
-            self.private.remove(known)
-        self.private.append((name, value, origin))
+        """Add a ``~param`` at the end; it replaces an earlier one of the same name."""
+        self.private.pop(name, None)
+        self.private[name] = value, origin
 
 
 def make_global(ns: str) -> str:

@@ -15,12 +15,10 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from rosz.errors import RoszError, near_miss
+from rosz.errors import LaunchError, RoszError, near_miss
 from rosz.launch.plan.context import LaunchContext
 from rosz.launch.plan.document import TextError
 from rosz.launch.plan.scope import Scope
-
-__all__ = ("Substitution", "guess_type")
 
 _EVAL = "$(eval "
 _SUGGESTED = ("anon", "arg", "dirname", "env", "eval", "find", "optenv")
@@ -43,6 +41,41 @@ def guess_type(text: str) -> bool | int | float | str:
         pass
     lower = text.lower()
     return lower == "true" if lower in {"true", "false"} else text
+
+
+def parse_bool(text: str) -> bool:
+    """Return the bool that a text of a condition or a parameter means.
+
+    Raises:
+        ValueError: If it means none.
+    """
+    lower = text.lower().strip()
+    if lower not in {"true", "1", "false", "0"}:
+        raise ValueError(f"'{text}' is not a bool; expected true, false, 1 or 0")
+    return lower in {"true", "1"}
+
+
+def substitute(
+    text: str, context: LaunchContext, args: dict[str, str], anonymous: dict[str, str], file: str
+) -> str:
+    """Return a text outside any launch file with all substitutions applied.
+
+    Args:
+        text: The text.
+        context: Source of variables, packages and anonymous names.
+        args: Values of args by name.
+        anonymous: Names made by ``$(anon)`` by base name, which grow here.
+        file: Path of the launch file, for ``$(dirname)``.
+
+    Raises:
+        LaunchError: If a substitution is malformed or has no value.
+    """
+    scope = Scope("/", file)
+    scope.args, scope.anonymous = args, anonymous
+    try:
+        return Substitution(context)(text, scope)
+    except TextError as error:
+        raise LaunchError(error.reason) from error
 
 
 class Substitution:
@@ -208,12 +241,12 @@ def _split(inner: str, index: int) -> tuple[str, list[str]]:
 
 def _collect(text: str) -> list[tuple[str, int]]:
     """Return the content and the start of every substitution in a text."""
-    found: list[tuple[str, int]] = []
+    contents: list[tuple[str, int]] = []
     for match in _SUBSTITUTION.finditer(text):
         content, end = match.groups()
         if end in {"$", "("}:
             reason = "substitutions do not nest; $(eval …) can combine values"
             raise TextError(f"'{end}' inside a substitution; {reason}", match.start(2))
         if content and end:
-            found.append((content, match.start()))
-    return found
+            contents.append((content, match.start()))
+    return contents

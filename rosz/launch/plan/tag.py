@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NoReturn
 
 from rosz.errors import InvalidName
 from rosz.launch.plan.document import TAGS, Element, TagError, TextError, unknown_attribute
 from rosz.launch.plan.model import Place
 from rosz.launch.plan.scope import Scope
-from rosz.launch.plan.substitution import Substitution
-
-__all__ = ("Tag", "Warn")
+from rosz.launch.plan.substitution import Substitution, parse_bool
 
 Warn = Callable[[Element, str, str | None, int], None]
 """Takes a warning: element, text, attribute name or None, index in the attribute's value."""
@@ -21,17 +20,14 @@ Warn = Callable[[Element, str, str | None, int], None]
 class Tag:
     """An element in a scope.
 
+    Methods that read an attribute raise `TagError`, at its place, if the attribute is wrong or a
+    substitution in it fails.
+
     Args:
-        element: The element.
-        scope: The scope that substitutions look names up in.
-        substitution: Applies the substitutions.
-        warn: Function that takes warnings.
         refuse: Function that takes the error of a tag, and raises it unless all are wanted.
         includes: Places of the ``<include>`` tags that led here, outermost first.
 
     Attributes:
-        element: The element.
-        scope: The scope.
         name: Name of the tag in lower case.
     """
 
@@ -64,18 +60,14 @@ class Tag:
 
     def check(self) -> None:
         """Warn about attributes that the tag does not have."""
-        known = TAGS[self.name].attributes
+        allowed = TAGS[self.name].attributes
         for attribute in self.element.attributes:
             foreign = ":" in attribute and self.name == "launch"  # a schema for editors
-            if attribute not in known and not foreign:
+            if attribute not in allowed and not foreign:
                 self.warn(unknown_attribute(self.name, attribute), attribute)
 
     def wanted(self) -> bool:
-        """Return whether ``if`` and ``unless`` let the tag take part.
-
-        Raises:
-            TagError: If both are present, or one is not a bool.
-        """
+        """Return whether ``if`` and ``unless`` let the tag take part."""
         attributes = self.element.attributes
         if "if" not in attributes and "unless" not in attributes:
             return True
@@ -87,20 +79,13 @@ class Tag:
         return not self._condition(exclusion or "", "unless")
 
     def _condition(self, text: str, attribute: str) -> bool:
-        lower = text.lower().strip()
-        if lower in {"true", "1"}:
-            return True
-        if lower not in {"false", "0"}:
-            reason = f"'{text}' is not a bool; expected true, false, 1 or 0"
-            self.fail(f"'{attribute}': {reason}", attribute)
-        return False
+        try:
+            return parse_bool(text)
+        except ValueError as error:
+            self.fail(f"'{attribute}': {error}", attribute)
 
     def get(self, attribute: str) -> str | None:
-        """Return an attribute with substitutions applied, or None if it is absent.
-
-        Raises:
-            TagError: If a substitution fails.
-        """
+        """Return an attribute with substitutions applied, or None if it is absent."""
         text = self.element.attributes.get(attribute)
         if text is None or "$" not in text:
             return text
@@ -123,30 +108,18 @@ class Tag:
         return self._substitution(text, self.scope)
 
     def require(self, attribute: str, *others: str) -> str:
-        """Return a required attribute.
-
-        Args:
-            attribute: Name of the attribute.
-            *others: Names to try in turn if the attribute is absent.
-
-        Raises:
-            TagError: If the attribute is absent, or a substitution fails.
-        """
+        """Return a required attribute, or the first of the others that is there."""
         texts = (self.get(name) for name in (attribute, *others))
-        found = next((text for text in texts if text is not None), None)
-        if found is None:
-            known = TAGS[self.name].attributes
-            strangers = [name for name in self.element.attributes if name not in known]
+        value = next((text for text in texts if text is not None), None)
+        if value is None:
+            allowed = TAGS[self.name].attributes
+            strangers = [name for name in self.element.attributes if name not in allowed]
             hint = f", and '{strangers[0]}' is not one of its attributes" if strangers else ""
             self.fail(f"<{self.name}> needs the attribute '{attribute}'{hint}")
-        return found
+        return value
 
     def alias(self, attribute: str, other: str) -> str | None:
-        """Return an attribute, or if it is absent, the attribute that ROS 2 uses for it.
-
-        Raises:
-            TagError: If a substitution fails.
-        """
+        """Return an attribute, or if it is absent, the attribute that ROS 2 uses for it."""
         if attribute not in self.element.attributes:
             return self.get(other)
         if other in self.element.attributes:
@@ -154,11 +127,7 @@ class Tag:
         return self.get(attribute)
 
     def flag(self, attribute: str) -> bool:
-        """Return a bool attribute, or False if it is absent.
-
-        Raises:
-            TagError: If the value is neither ``true`` nor ``false``.
-        """
+        """Return a bool attribute, or False if it is absent."""
         text = self.get(attribute)
         if text is None:
             return False
@@ -167,16 +136,7 @@ class Tag:
         return text.lower() == "true"
 
     def number(self, attribute: str, default: float, least: float = -math.inf) -> float:
-        """Return an attribute that is a finite number.
-
-        Args:
-            attribute: Name of the attribute.
-            default: Value to return if the attribute is absent.
-            least: Least value allowed.
-
-        Raises:
-            TagError: If the value is not a number, or is below the least value.
-        """
+        """Return an attribute that is a finite number, or the default if it is absent."""
         text = self.get(attribute)
         if text is None:
             return default
@@ -190,16 +150,7 @@ class Tag:
         return value
 
     def whole(self, attribute: str, default: int | None, least: float) -> int | None:
-        """Return an attribute that is a whole number.
-
-        Args:
-            attribute: Name of the attribute.
-            default: Value to return if the attribute is absent or empty.
-            least: Least value allowed.
-
-        Raises:
-            TagError: If the value is not a whole number, or is below the least value.
-        """
+        """Return an attribute that is a whole number, or the default if it is absent or empty."""
         text = self.get(attribute)
         if not text:
             return default
@@ -212,19 +163,11 @@ class Tag:
         return value
 
     def words(self, attribute: str) -> tuple[str, ...]:
-        """Return an attribute split into words as a shell does, or () if it is absent.
-
-        Raises:
-            TagError: If the quotes do not match.
-        """
+        """Return an attribute split into words as a shell does, or () if it is absent."""
         return self.split(attribute, self.get(attribute) or "")
 
     def split(self, attribute: str, text: str) -> tuple[str, ...]:
-        """Split the value of an attribute into words as a shell does.
-
-        Raises:
-            TagError: If the quotes do not match.
-        """
+        """Split the value of an attribute into words as a shell does."""
         if not text:
             return ()
         import shlex
@@ -238,9 +181,6 @@ class Tag:
         """Return an attribute with substitutions applied twice, as roslaunch does for ``args``.
 
         The second time, no args and no anonymous names are known.
-
-        Raises:
-            TagError: If a substitution fails.
         """
         text = self.get(attribute) or ""
         try:
@@ -249,26 +189,17 @@ class Tag:
             self.fail(f"in '{text}', which '{attribute}' came to: {error.reason}", attribute)
 
     def remap(self, into: Scope) -> None:
-        """Add the remapping of a ``<remap>`` to a scope.
-
-        Raises:
-            TagError: If a name is missing or invalid.
-        """
+        """Add the remapping of a ``<remap>`` to a scope."""
         self.check()
         old, new = self.require("from"), self.require("to")
         try:
-            into.remap(old, new)
-        except TextError as error:
-            raise TagError(self.element, error.reason) from error
+            with self.refusing():
+                into.remap(old, new)
         except InvalidName as error:
             self.fail(str(error), "from" if error.name in {old, old.strip("/")} else "to")
 
     def env(self, into: Scope) -> None:
-        """Add the variable of an ``<env>`` or ``<set_env>`` to a scope.
-
-        Raises:
-            TagError: If the name or the value is missing.
-        """
+        """Add the variable of an ``<env>`` or ``<set_env>`` to a scope."""
         self.check()
         name, value = self.require("name"), self.require("value")
         if not name:
@@ -277,12 +208,16 @@ class Tag:
         if self.name == "set_env":
             into.environ[name] = value
 
-    def fail(self, reason: str, attribute: str | None = None, index: int = 0) -> NoReturn:
-        """Refuse the file.
+    @contextmanager
+    def refusing(self, attribute: str | None = None) -> Iterator[None]:
+        """Refuse the file for a `TextError` in a block, with the place of an attribute."""
+        try:
+            yield
+        except TextError as error:
+            raise TagError(self.element, error.reason, attribute) from error
 
-        Raises:
-            TagError: Always.
-        """
+    def fail(self, reason: str, attribute: str | None = None, index: int = 0) -> NoReturn:
+        """Refuse the file."""
         raise TagError(self.element, reason, attribute, index)
 
     def warn(self, text: str, attribute: str | None = None, index: int = 0) -> None:

@@ -1,54 +1,74 @@
 """Run launch plans: parameters, processes, their output and their end.
 
-`Runner` takes a plan and a `Network`; a `StatusClient` sends requests to running launches. May
-import floors 0 to 5. `relay` is a program, which runs beside the launch. The public modules are
-those that start-up needs alone.
+`Runner` takes a plan and a `Network`; a `StatusClient` sends requests to running launches; the
+public module `report` returns the texts of roslaunch about a plan. May import floors 0 to 5.
+`relay` is a program, which runs beside the launch. The names are imported on first use, since
+commands have to start fast.
 """
 
-from rosz.launch.run.command import Command, Workplace, run_command
-from rosz.launch.run.control import LaunchStatus, NodeStatus, StatusClient
-from rosz.launch.run.excerpt import Excerpt
-from rosz.launch.run.host import Child, Host, ProcessSpec, is_local
-from rosz.launch.run.loop import interrupted_by_signals
-from rosz.launch.run.machines import MachineOption
-from rosz.launch.run.network import (
-    Network,
-    RouterProcess,
-    core_params,
-    needs_router,
-    write_params,
-)
-from rosz.launch.run.process_tree import ProcessTree
-from rosz.launch.run.runner import Options, Runner, describe_plan
-from rosz.launch.run.supervisor import Process as LaunchProcess
-from rosz.launch.run.supervisor import Supervisor, Timeouts
+from __future__ import annotations
+
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from rosz.launch.run.agent import serve
+    from rosz.launch.run.command import Workplace, container_of, locate, run_command
+    from rosz.launch.run.control import LaunchStatus, NodeStatus, StatusClient
+    from rosz.launch.run.host import is_local, is_local_address
+    from rosz.launch.run.loop import interrupted_by_signals
+    from rosz.launch.run.machines import MachineOption
+    from rosz.launch.run.network import (
+        Network,
+        RouterProcess,
+        core_params,
+        needs_router,
+        write_params,
+    )
+    from rosz.launch.run.protocol import Timeouts
+    from rosz.launch.run.runner import Options, Runner, describe_plan
+    from rosz.launch.run.supervisor import LaunchProcess, Supervisor
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "agent": "serve",
+            "command": "Workplace container_of locate run_command",
+            "control": "LaunchStatus NodeStatus StatusClient",
+            "host": "is_local is_local_address",
+            "loop": "interrupted_by_signals",
+            "machines": "MachineOption",
+            "network": "Network RouterProcess core_params needs_router write_params",
+            "protocol": "Timeouts",
+            "runner": "Options Runner describe_plan",
+            "supervisor": "LaunchProcess Supervisor",
+        },
+    )
 
 __all__ = (
-    "Child",
-    "Command",
-    "Excerpt",
-    "Host",
     "LaunchProcess",
     "LaunchStatus",
     "MachineOption",
     "Network",
     "NodeStatus",
     "Options",
-    "ProcessSpec",
-    "ProcessTree",
     "RouterProcess",
     "Runner",
     "StatusClient",
     "Supervisor",
     "Timeouts",
     "Workplace",
+    "container_of",
     "core_params",
     "describe_plan",
     "interrupted_by_signals",
     "is_local",
+    "is_local_address",
+    "locate",
     "needs_router",
     "run_command",
+    "serve",
     "write_params",
 )
 
-PUBLIC_MODULES = ("agent", "command", "network")
+PUBLIC_MODULES = ("report",)

@@ -21,58 +21,27 @@ import msgspec
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, RoszError
 from rosz.launch.plan import NodePlan
+from rosz.launch.run import protocol
 from rosz.launch.run.command import Workplace
-from rosz.launch.run.host import Child, LocalHost
-from rosz.launch.run.loop import Loop, Timer
-from rosz.launch.run.output import Output, RunFolder
+from rosz.launch.run.host import LocalHost
+from rosz.launch.run.loop import Loop, LoopTimer
+from rosz.launch.run.output import RelayedOutput, RunFolder
 from rosz.launch.run.process_tree import ProcessTree
-from rosz.launch.run.protocol import (
-    PROTOCOL,
-    AgentVersion,
-    AgentWarning,
-    Exited,
-    Gone,
-    LineReader,
-    Measure,
-    Measured,
-    MessageWriter,
-    OutputRead,
-    ReadOutput,
-    Ready,
-    Refused,
-    Request,
-    Setup,
-    Shown,
-    Signal,
-    Start,
-    Started,
-    rosz_version,
-)
+from rosz.launch.run.protocol import AgentSetup, LineReader, MessageWriter, rosz_version
 from rosz.session import first_listening, is_listening
-
-__all__ = ("FindMaster", "serve")
 
 FindMaster = Callable[[Mapping[str, str], Environment], tuple[str, dict[str, str]]]
 """Function that finds a master of ROS 1 by environment variables, and the settings in them.
 
 It returns whose master it is, and the environment variables of the programs that have it."""
 
-_CHECK_INTERVAL = 0.02
 _SETUP_TIMEOUT = 60.0
 _CONNECT_TIMEOUT = 1.0
 _CLOSE_TIMEOUT = 1.0
 
 
 class _Agent:
-    """The processes of one launch on this machine.
-
-    Args:
-        requests: Reader of the launch's requests.
-        reports: Descriptor for reports to the launch.
-        screens: Standard output (1) or error (2) of nodes, by the descriptor to read it from.
-        environ: Environment variables of this process.
-        find_master: Function that finds a master for programs that may speak ROS 1's protocol.
-    """
+    """The processes of one launch on this machine."""
 
     def __init__(
         self,
@@ -85,24 +54,25 @@ class _Agent:
         self._loop = Loop()
         self._requests = requests
         self._writer = MessageWriter(reports)
-        self._screens = screens
+        self._screens = screens  # 1 or 2, by the descriptor to read from
         self._environ = environ
         self._find_master = find_master
         self._workplace: Workplace | None = None
         self._has_master = False
-        self._decoder = msgspec.json.Decoder(Request)
-        self._setup: Setup | None = None
-        self._output: Output | None = None
+        self._decoder = msgspec.json.Decoder(protocol.Request)
+        self._setup: AgentSetup | None = None
+        self._output: RelayedOutput | None = None
         self._host: LocalHost | None = None
-        self._children: dict[int, Child] = {}
-        self._timeout: Timer | None = None
+        self._timeout: LoopTimer | None = None
         self._ending = False
 
     def run(self) -> None:
         """Run until the launch, or the connection to it, ends."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
             signal.signal(number, lambda *_: self._loop.post(self._end))
-        self._writer.send(AgentVersion(PROTOCOL, rosz_version(), socket.gethostname()))
+        self._writer.send(
+            protocol.AgentVersion(protocol.PROTOCOL, rosz_version(), socket.gethostname())
+        )
         self._loop.watch(self._requests.fd, self._read_requests)
         self._watch_screens()
         self._restart_timeout()
@@ -142,43 +112,44 @@ class _Agent:
         """Send output of nodes to the launch, and pause if too much of it waits."""
         with suppress(BlockingIOError):
             data = os.read(fd, 65536)
-            self._writer.send(Shown(sink, data))
+            self._writer.send(protocol.Shown(sink, data))
         if self._writer.full:
             for other in self._screens:
                 self._loop.unwatch(other)
             self._writer.when_free(lambda: self._loop.post(self._watch_screens))
 
-    def _handle(self, request: Request) -> None:
-        if isinstance(request, Setup):
+    def _handle(self, request: protocol.Request) -> None:
+        if isinstance(request, AgentSetup):
             self._set_up(request)
-        elif isinstance(request, Start):
-            self._start(request)
-        elif isinstance(request, Signal):
-            child = self._children.get(request.serial)
-            if child is not None:
-                child.signal(request.number)
-        elif isinstance(request, Measure):
-            assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
-            self._host.measure(lambda used: self._writer.send(Measured(used)))
-        elif isinstance(request, ReadOutput):
-            assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
+            return
+        host = self._host
+        assert host is not None  # noqa: S101  # a launch sends `AgentSetup` first
+        if isinstance(request, protocol.Start):
+            self._start(host, request)
+        elif isinstance(request, protocol.Signal):
+            host.send(request)
+        elif isinstance(request, protocol.Measure):
+            host.measure(lambda used: self._writer.send(protocol.Measured(used)))
+        elif isinstance(request, protocol.ReadOutput):
             number = request.number
-            self._host.read_output(
+            host.read_output(
                 request.owner,
                 request.after,
-                lambda excerpt: self._writer.send(OutputRead(number, excerpt)),
+                lambda excerpt: self._writer.send(protocol.OutputRead(number, excerpt)),
             )
 
-    def _set_up(self, setup: Setup) -> None:
+    def _set_up(self, setup: AgentSetup) -> None:
         self._setup = setup
         self._environ["ROS_DOMAIN_ID"] = str(setup.domain)
         environment = Environment.read(self._environ)
-        reaches = _find_launch(environment, setup, self._environ.get("SSH_CONNECTION", ""))
-        if reaches and not _has_connection(environment):
-            self._environ["ROSZ_CONNECT"] = reaches
-            environment = Environment.read(self._environ)
-        self._output = Output(
-            self._loop, lambda text: self._writer.send(AgentWarning(text)), setup.tag
+        reaches = _own_connection(environment)
+        if not reaches:
+            reaches = _find_launch(setup, self._environ.get("SSH_CONNECTION", ""))
+            if reaches:
+                self._environ["ROSZ_CONNECT"] = reaches
+                environment = Environment.read(self._environ)
+        self._output = RelayedOutput(
+            self._loop, lambda text: self._writer.send(protocol.AgentWarning(text)), setup.tag
         )
         self._workplace = Workplace(
             package_index(environment), environment, self._environ, str(Path.cwd())
@@ -191,53 +162,41 @@ class _Agent:
             tag=setup.tag,
             prefixed=setup.prefixed,
         )
-        self._writer.send(Ready(reaches))
+        self._host.report = self._report
+        self._writer.send(protocol.Ready(reaches))
 
     def _make_folder(self, folder: RunFolder) -> RunFolder | None:
         try:
             folder.create()
         except LaunchError as error:
-            self._writer.send(AgentWarning(f"WARNING: {error}; continuing without logs"))
+            self._writer.send(protocol.AgentWarning(f"WARNING: {error}; continuing without logs"))
             return None
         return folder
 
-    def _start(self, request: Start) -> None:
-        assert self._host is not None  # noqa: S101  # a launch sends `Setup` first
-        serial = request.serial
-
-        def exited(code: int, tail: tuple[str, ...]) -> None:
-            self._writer.send(Exited(serial, code, tail))
-            self._check_gone(serial)
-
+    def _start(self, host: LocalHost, request: protocol.Start) -> None:
         try:
             self._give_master(request.job.node)
-            child = self._host.start(request.job, exited)
         except RoszError as error:
-            self._writer.send(Refused(serial, str(error)))
-            return
-        self._children[serial] = child
-        self._writer.send(Started(serial, child.pid, child.shown, child.logs))
+            self._writer.send(protocol.Refused(request.serial, str(error)))
+        else:
+            host.send(request)
 
     def _give_master(self, node: NodePlan) -> None:
         """Have a master of ROS 1 here before the first node starts that may need it."""
         workplace = self._workplace
         if workplace is None or self._has_master or not workplace.may_need_master(node):
             return
-        whose, found = self._find_master(self._environ, workplace.environment)
-        self._environ.update(found)  # the workplace has it, too
+        whose, variables = self._find_master(self._environ, workplace.environment)
+        self._environ.update(variables)  # the workplace has it, too
         self._has_master = True
-        uri = found["ROS_MASTER_URI"]
-        self._writer.send(AgentWarning(f"nodes not in Python have {whose} ROS 1 master {uri}"))
+        uri = variables["ROS_MASTER_URI"]
+        self._writer.send(
+            protocol.AgentWarning(f"nodes not in Python have {whose} ROS 1 master {uri}")
+        )
 
-    def _check_gone(self, serial: int) -> None:
-        """Report when a process and all its descendants have ended."""
-        child = self._children[serial]
-        if child.remains():
-            self._loop.later(_CHECK_INTERVAL, partial(self._check_gone, serial))
-            return
-        del self._children[serial]
-        self._writer.send(Gone(serial))
-        if self._ending and not self._children:
+    def _report(self, report: protocol.ProcessReport) -> None:
+        self._writer.send(report)
+        if self._ending and self._host is not None and self._host.is_idle:
             self._loop.stop()
 
     def _end(self) -> None:
@@ -246,46 +205,32 @@ class _Agent:
             return
         self._ending = True
         self._loop.unwatch(self._requests.fd)
-        if self._setup is None or not self._children:
+        host = self._host
+        if self._setup is None or host is None or host.is_idle:
             self._loop.stop()
             return
         timeouts = self._setup.timeouts
-        self._signal(signal.SIGINT)
-        self._loop.later(timeouts.sigint, lambda: self._signal(signal.SIGTERM))
+        host.signal_all(signal.SIGINT)
+        self._loop.later(timeouts.sigint, lambda: host.signal_all(signal.SIGTERM))
         self._loop.later(timeouts.sigint + timeouts.sigterm, self._loop.stop)
 
-    def _signal(self, number: signal.Signals) -> None:
-        for child in self._children.values():
-            child.signal(number)
 
-
-def _has_connection(environment: Environment) -> bool:
-    """Return whether the settings of this machine say how to reach others."""
-    return bool(
-        environment.connect
-        or environment.listen
-        or environment.multicast
-        or environment.zenoh_config
-        or is_listening(environment.rendezvous)
-    )
-
-
-def _find_launch(environment: Environment, setup: Setup, connection: str) -> str:
-    """Return what nodes here connect to: by the settings of this machine, otherwise the launch.
-
-    Args:
-        environment: Settings of this machine.
-        setup: Settings of the launch, with the endpoints where it may be.
-        connection: ``SSH_CONNECTION``, which begins with the address of the launch.
-    """
+def _own_connection(environment: Environment) -> str:
+    """Return where nodes connect by the settings of this machine; "" if these say nothing."""
     if environment.connect:
         return ",".join(environment.connect)
     if environment.multicast:
         return "peers found by multicast"
     if environment.listen or environment.zenoh_config:
         return "peers named in the settings of this machine"
-    if is_listening(environment.rendezvous):
-        return environment.rendezvous
+    return environment.rendezvous if is_listening(environment.rendezvous) else ""
+
+
+def _find_launch(setup: AgentSetup, connection: str) -> str:
+    """Return where nodes here reach the launch; "" if they do not.
+
+    ``SSH_CONNECTION`` begins with the address of the launch.
+    """
     caller = connection.partition(" ")[0]
     caller = f"[{caller}]" if ":" in caller else caller
     meet = [
@@ -295,11 +240,7 @@ def _find_launch(environment: Environment, setup: Setup, connection: str) -> str
 
 
 def serve(find_master: FindMaster) -> None:
-    """Run the agent of the launch at the other end of standard input and output.
-
-    Args:
-        find_master: Function that finds a master for programs that may speak ROS 1's protocol.
-    """
+    """Run the agent of the launch at the other end of standard input and output."""
     requests, reports = os.dup(0), os.dup(1)
     screens = {}
     nothing = os.open(os.devnull, os.O_RDONLY)

@@ -2,7 +2,7 @@
 
 A Python script runs with the interpreter that runs rosz, and can import ROS 1's modules
 (``python -m rosz.script SCRIPT``); any other program runs as it is. It finds ROS 1's commands, and
-what it starts in Python finds ROS 1's modules, as in a shell with ``rosz env``.
+Python programs that it starts find ROS 1's modules, as in a shell with ``rosz env``.
 """
 
 from __future__ import annotations
@@ -18,21 +18,12 @@ import msgspec
 
 from rosz.environment import Environment
 from rosz.errors import ExecutableNotFound, LaunchError, NotFoundError, UsageError
-from rosz.launch.plan import NodePlan, report
+from rosz.launch.plan import NodePlan
+from rosz.launch.run import report
 from rosz.launch.run.process_tree import TAG
 from rosz.packages import Package, PackageIndex, is_python, start_words
 from rosz.program import ProgramSpec
 from rosz.remap import parse
-
-__all__ = (
-    "Command",
-    "Workplace",
-    "base_environ",
-    "container_command",
-    "container_of",
-    "locate",
-    "run_command",
-)
 
 _LAUNCH_SUFFIXES = (".launch", ".launch.xml")
 _PYTHON = re.compile(r"python[0-9.]*")
@@ -43,14 +34,11 @@ _MODULES = str(_ROSZ / "ros1" / "shell")
 _CONTAINER = ("-P", *_SCRIPT, "--container")
 
 
-class Command(msgspec.Struct, frozen=True):
+class NodeCommand(msgspec.Struct, frozen=True):
     """A command to execute.
 
     Attributes:
-        argv: Program and arguments.
         shown: The same for messages: the script without its interpreter.
-        environ: All environment variables.
-        cwd: Folder to start in.
         python: Whether it is a Python script that rosz runs.
         direct: Whether it gets the terminal of the launch, which a debugger needs.
     """
@@ -67,9 +55,6 @@ class Workplace(msgspec.Struct, frozen=True):
     """The packages and settings from which commands are made.
 
     Attributes:
-        packages: The known packages.
-        environment: Settings of this process.
-        environ: Environment variables of this process.
         cwd: Folder in which the launch was started.
     """
 
@@ -78,13 +63,10 @@ class Workplace(msgspec.Struct, frozen=True):
     environ: Mapping[str, str]
     cwd: str
 
-    def command(self, node: NodePlan, *, log_file: Path | None, tag: str) -> Command:
+    def command(self, node: NodePlan, *, log_file: Path | None, tag: str) -> NodeCommand:
         """Return the command of a node.
 
-        Args:
-            node: The node.
-            log_file: Path for the node's own log, or None to leave it to the node.
-            tag: Tag of the process and its descendants.
+        Without the path of a log file, the log is left to the node.
 
         Raises:
             PackageNotFound: If there is no such package.
@@ -98,7 +80,7 @@ class Workplace(msgspec.Struct, frozen=True):
         direct = bool(node.launch_prefix) and node.output == "screen"
         if node.command:
             words = tuple(report.command_line(node, self.find))
-            return Command(words, words, environ, self._cwd(node.cwd, None), direct=direct)
+            return NodeCommand(words, words, environ, self._cwd(node.cwd, None), direct=direct)
         shown = tuple(report.command_line(node, self.find))
         if log_file is not None:
             shown = (*shown, f"__log:={log_file}")
@@ -108,7 +90,7 @@ class Workplace(msgspec.Struct, frozen=True):
         if not python:
             environ = _with_ros1_names(environ)
         start = _start(node.launch_prefix, program, python=python)
-        return Command(
+        return NodeCommand(
             argv=(*start, *shown[prefixed + 1 :]),
             shown=shown,
             environ=environ,
@@ -117,8 +99,9 @@ class Workplace(msgspec.Struct, frozen=True):
             direct=direct,
         )
 
-    def _container(self, node: NodePlan, environ: dict[str, str], log_file: Path | None) -> Command:
-        """Return the command of a container; see `rosz.ros1.container`."""
+    def _container(
+        self, node: NodePlan, environ: dict[str, str], log_file: Path | None
+    ) -> NodeCommand:
         environ.pop("ROS_NAMESPACE", None)
         specs = [
             self._program(member, log_file)
@@ -184,7 +167,7 @@ class Workplace(msgspec.Struct, frozen=True):
 
 def run_command(
     workplace: Workplace, package: str, executable: str, args: Sequence[str], prefix: str = ""
-) -> Command:
+) -> NodeCommand:
     """Return the command of ``rosz run``, which replaces this process.
 
     Args:
@@ -202,7 +185,7 @@ def run_command(
     before = tuple(shlex.split(prefix))
     python = is_python(program)
     environ = base_environ(workplace.environ, workplace.environment)
-    return Command(
+    return NodeCommand(
         argv=(*_start(before, program, python=python), *args),
         shown=(*before, str(program), *args),
         environ=environ if python else _with_ros1_names(environ),
@@ -214,7 +197,7 @@ def run_command(
 
 def container_of(
     workplace: Workplace, commands: Sequence[str], *, by_reference: bool = False
-) -> Command:
+) -> NodeCommand:
     """Return the command of ``rosz run --with``.
 
     Args:
@@ -270,21 +253,12 @@ def container_command(  # those of a command
     *,
     by_reference: bool = False,
     node: bool = False,
-) -> Command:
-    """Return the command that runs several Python programs in one process.
-
-    Args:
-        name: Name of the container.
-        programs: The programs.
-        environ: Environment variables of the process.
-        cwd: Folder to start in.
-        by_reference: Whether nodes of rospy pass on messages themselves.
-        node: Whether the container is a node too.
-    """
+) -> NodeCommand:
+    """Return the command that runs several Python programs in one process."""
     options = [*["--by-reference"] * by_reference, *["--node"] * node]
     specs = [msgspec.json.encode(program).decode() for program in programs]
     shown = [f"{spec.script} {' '.join(spec.arguments)}".strip() for spec in programs]
-    return Command(
+    return NodeCommand(
         argv=(sys.executable, *_CONTAINER, name, *options, *specs),
         shown=(f"container {name}:", " + ".join(shown)),
         environ=environ,
@@ -297,10 +271,6 @@ def base_environ(environ: Mapping[str, str], environment: Environment) -> dict[s
     """Return the environment variables of a child: those of this process, and the package path.
 
     The child may start in another folder, from which it would find other packages.
-
-    Args:
-        environ: Environment variables of this process.
-        environment: Settings of this process.
     """
     roots = os.pathsep.join(str(root) for root in environment.package_roots)
     return {**environ, "ROSZ_PACKAGE_PATH": roots} if roots else dict(environ)

@@ -17,49 +17,32 @@ from typing import TextIO
 
 from rosz.worker import Worker
 
-__all__ = ("Console", "ConsoleWriter", "LaunchLog")
-
 _BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
 _CLOSE_TIMEOUT = 1.0
 _WRITE_TIMEOUT = 0.05
-"""Time in seconds to wait for a text, so that what nodes write next comes after it."""
+"""Time in seconds to wait for a text, so that later output of nodes comes after it."""
 _CAPACITY = 1024 * 1024
 """Number of waiting characters at which the writer is full."""
 
 
-class ConsoleWriter:
+class ConsoleWriter(Worker[tuple[TextIO, str, threading.Event]]):
     """Writes texts to streams in order, on a thread."""
 
     def __init__(self) -> None:
-        self._worker = Worker[tuple[TextIO, str, threading.Event]](
-            "rosz console", _write, capacity=_CAPACITY, size=lambda item: len(item[1])
-        )
+        super().__init__("rosz console", _write, capacity=_CAPACITY, size=lambda item: len(item[1]))
         self._last = threading.Event()
         self._last.set()
         self._stuck = False
 
     def write(self, stream: TextIO, text: str) -> None:
         """Write a text, now or as soon as the stream accepts it."""
-        if self._worker.closed:
+        if self.closed:
             return
         self._stuck = self._stuck and not self._last.is_set()
         self._last = threading.Event()
-        self._worker.submit((stream, text, self._last))
+        self.submit((stream, text, self._last))
         if not self._stuck:
             self._stuck = not self._last.wait(_WRITE_TIMEOUT)
-
-    @property
-    def full(self) -> bool:
-        """Whether so much text waits that less urgent output should wait."""
-        return self._worker.full
-
-    def when_free(self, callback: Callable[[], None]) -> None:
-        """Call a function once, here or on the thread, when the writer is not full."""
-        self._worker.when_free(callback)
-
-    def close(self, timeout: float) -> None:
-        """Write what waits for at most ``timeout`` seconds; a second call waits again."""
-        self._worker.close(timeout)
 
 
 def _write(item: tuple[TextIO, str, threading.Event]) -> None:
@@ -85,9 +68,6 @@ def _write(item: tuple[TextIO, str, threading.Event]) -> None:
 
 class LaunchLog:
     """The log file of the launch process itself.
-
-    Args:
-        path: File to append to.
 
     Raises:
         OSError: If it cannot be written.
@@ -125,18 +105,12 @@ class LaunchLog:
         if file is not None:
             try:
                 file.close()
-            except OSError:  # the disk is full, and what was not flushed is lost
+            except OSError:  # the disk is full: the lines that were not flushed are lost
                 return
 
 
 class Console:
     """The output streams of a launch, with colours on terminals.
-
-    Args:
-        out: Stream for normal messages.
-        err: Stream for errors.
-        verbose: Whether notes are printed too.
-        color: Whether terminals get colours.
 
     Attributes:
         log: The log file of the launch, or None.
@@ -195,7 +169,7 @@ class Console:
             self.log.dump_stacks(reason)
 
     def close(self) -> None:
-        """Print what waits, and close the log; a second call has no effect."""
+        """Print waiting texts, and close the log; a second call has no effect."""
         self._writer.close(_CLOSE_TIMEOUT)
         if self.log is not None:
             self.log.close()

@@ -1,6 +1,6 @@
 """Which nodes of a launch share a process.
 
-``<group container="name">`` says so, and so do ROS 1's lines for nodelets, where what they load is
+``<group container="name">`` says so, and so do ROS 1's lines for nodelets, where they load
 a Python script: ``args="manager"``, ``args="load PKG/SCRIPT MANAGER"``, and ``args="standalone
 PKG/SCRIPT"`` for a process of its own. Other lines for nodelets run ROS 1's own program.
 
@@ -20,8 +20,6 @@ from rosz.launch.plan import NodePlan
 from rosz.launch.run.command import Workplace
 from rosz.packages import is_python
 
-__all__ = ("group_nodes",)
-
 _NODELET = "nodelet"
 _NO_BOND = "--no-bond"
 
@@ -29,13 +27,7 @@ _NO_BOND = "--no-bond"
 def group_nodes(
     nodes: Sequence[NodePlan], workplace: Workplace, warn: Callable[[str], None]
 ) -> tuple[NodePlan, ...]:
-    """Return the processes of a launch: its nodes, with those of a container in one.
-
-    Args:
-        nodes: Nodes of the plan, in order.
-        workplace: The packages, to tell which nodes are Python scripts.
-        warn: Function that takes warnings.
-    """
+    """Return the processes of a launch: its nodes, with those of a container in one."""
     nodes = _read_nodelets(nodes, workplace)
     groups: dict[tuple[str, str], list[NodePlan]] = {}
     processes: list[NodePlan | tuple[str, str]] = []
@@ -56,26 +48,26 @@ def group_nodes(
             )
         processes.append(node)
     return tuple(
-        _merge(groups[one]) if isinstance(one, tuple) else replace(one, container="")
-        for one in processes
+        _merge(groups[process]) if isinstance(process, tuple) else replace(process, container="")
+        for process in processes
     )
 
 
 def _read_nodelets(nodes: Sequence[NodePlan], workplace: Workplace) -> list[NodePlan]:
     """Return nodes with Python scripts in place of the nodelets that are such."""
-    found = [_read_nodelet(node, workplace) for node in nodes]
-    compiled = {_manager(node) for node in found if _nodelet_words(node)[:1] == ("load",)}
-    # A manager of C++ stays what it is; its Python nodes share another process.
-    found = [
+    expanded = [_read_nodelet(node, workplace) for node in nodes]
+    compiled = {_manager(node) for node in expanded if _nodelet_words(node)[:1] == ("load",)}
+    # A manager of C++ stays one; its Python nodes share another process.
+    expanded = [
         replace(node, container=f"{node.container}_python") if node.container in compiled else node
-        for node in found
+        for node in expanded
     ]
-    used = {(node.container, node.machine) for node in found}
+    used = {(node.container, node.machine) for node in expanded}
     return [
         replace(node, container=node.full_name)
         if _nodelet_words(node)[:1] == ("manager",) and (node.full_name, node.machine) in used
         else node
-        for node in found
+        for node in expanded
     ]
 
 
@@ -120,7 +112,7 @@ def _objection(node: NodePlan, members: Sequence[NodePlan], workplace: Workplace
         if env.get(name, value) != value:
             return f"the environment is of a whole process, where {name} is '{env[name]}' already"
     others = {other.full_name for other in members}
-    if any(one.name in others for wait in node.wait_for for one in wait.any_of):
+    if any(condition.name in others for wait in node.wait_for for condition in wait.any_of):
         return "it waits for a node of the container"
     is_manager = node.full_name == node.container
     return "" if node.machine or is_manager else _problem(node, workplace)
@@ -136,7 +128,6 @@ def _problem(node: NodePlan, workplace: Workplace) -> str:
 
 
 def _merge(members: Sequence[NodePlan]) -> NodePlan:
-    """Return the process of a container."""
     first = members[0]
     respawning = [node for node in members if node.respawn]
     limits = [node.respawn_max for node in respawning if node.respawn_max is not None]

@@ -15,14 +15,12 @@ import msgspec
 
 from rosz.errors import LaunchError, NotFoundError, RoszError, WaitTimeout, near_miss
 from rosz.launch.run.excerpt import Excerpt, Position
-from rosz.launch.run.loop import Loop, Timer
+from rosz.launch.run.loop import Loop, LoopTimer
 from rosz.launch.run.process_tree import Usage
-from rosz.launch.run.supervisor import Process, Supervisor, describe_exit
+from rosz.launch.run.supervisor import LaunchProcess, Supervisor, describe_exit
 from rosz.lifecycle import Closable
 from rosz.session import Query, Reply, Session
 from rosz.wire import own_key
-
-__all__ = ("LaunchStatus", "NodeStatus", "StatusClient", "StatusRequest", "StatusServer")
 
 _STATUS_TIMEOUT = 2.0
 _ACTION_TIMEOUT = 60.0
@@ -37,7 +35,6 @@ class StatusRequest(msgspec.Struct, frozen=True):
 
     Attributes:
         action: ``status``, or ``restart``, ``stop`` or ``output`` for a node.
-        node: Full name of the node.
         after: Position of the output that is known already.
     """
 
@@ -50,12 +47,10 @@ class NodeStatus(msgspec.Struct, frozen=True):
     """One node of a running launch.
 
     Attributes:
-        name: Full name.
         type: ``package/type``, or the command.
         state: ``waiting``, ``running``, ``stopping``, ``respawning``, ``ended`` or ``failed``.
         detail: Reason why it ended or failed, or "" while it runs.
         pid: Process id, or 0 if it does not run.
-        restarts: Number of restarts.
         uptime: Time since its latest start in seconds, or 0 if it does not run.
         cpu: Processor time that it and its descendants have used in seconds.
         memory: Memory that they hold in bytes.
@@ -83,11 +78,8 @@ class LaunchStatus(msgspec.Struct, frozen=True):
 
     Attributes:
         run_id: Id of the run; launches that share a parameter store share it.
-        host: Name of the machine.
-        pid: Process id of the launch.
         files: Launch files, as absolute paths.
         sampled: Time of the figures in seconds of that machine's monotonic clock.
-        nodes: Nodes in order.
     """
 
     run_id: str
@@ -99,16 +91,7 @@ class LaunchStatus(msgspec.Struct, frozen=True):
 
 
 class StatusServer:
-    """Replies to requests about one launch.
-
-    Args:
-        session: Session that receives the requests.
-        domain: ROS domain.
-        run_id: Id of the run.
-        loop: Loop of the launch.
-        supervisor: Supervisor of the launch.
-        files: Launch files.
-    """
+    """Replies to requests about one launch."""
 
     def __init__(
         self,
@@ -138,7 +121,10 @@ class StatusServer:
                     process.owner, request.after, lambda excerpt: self._send(query, excerpt)
                 )
             else:
-                self._run(request, lambda: self._measure(lambda used: self._reply(query, used)))
+                self._run(
+                    request,
+                    lambda: self._measure(lambda used: self._send(query, self._status(used))),
+                )
         except (msgspec.MsgspecError, RoszError) as error:
             with query:
                 query.reply_error(str(error))
@@ -157,7 +143,7 @@ class StatusServer:
         """Collect the resources used on all machines, except those that take too long."""
         total: dict[int, Usage] = {}
         waiting = len(self._supervisor.hosts)
-        timer: Timer | None = None
+        timer: LoopTimer | None = None
 
         def finish() -> None:
             nonlocal waiting
@@ -180,9 +166,6 @@ class StatusServer:
         for host in self._supervisor.hosts:
             host.measure(add)
 
-    def _reply(self, query: Query, used: dict[int, Usage]) -> None:
-        self._send(query, self._status(used))
-
     def _send(self, query: Query, reply: msgspec.Struct) -> None:
         with query:
             query.reply(self._key, msgspec.json.encode(reply))
@@ -200,7 +183,7 @@ class StatusServer:
             ),
         )
 
-    def _node(self, process: Process, used: Usage) -> NodeStatus:
+    def _node(self, process: LaunchProcess, used: Usage) -> NodeStatus:
         node = process.node
         detail = process.error
         if process.over and not detail:
@@ -215,7 +198,7 @@ class StatusServer:
             uptime=self._loop.now() - process.began if process.alive else 0.0,
             cpu=used.cpu,
             memory=used.memory,
-            machine=process.place or socket.gethostname(),
+            machine=process.host.place or socket.gethostname(),
             members=tuple(member.full_name for member in node.members),
             required=node.required,
         )
@@ -226,20 +209,11 @@ class StatusServer:
 
 
 class StatusClient:
-    """Sends requests to running launches.
-
-    Args:
-        session: Session that sends the requests.
-        domain: ROS domain.
-    """
+    """Sends requests to running launches."""
 
     def __init__(self, session: Session, domain: int) -> None:
         self._session = session
         self._domain = domain
-
-    def statuses(self) -> list[LaunchStatus]:
-        """Return all running launches of the domain; errors are those of `running`."""
-        return list(self.running().values())
 
     def running(self) -> dict[str, LaunchStatus]:
         """Return all running launches of the domain, by the keys that they reply on.
@@ -253,17 +227,13 @@ class StatusClient:
             payload=msgspec.json.encode(StatusRequest("status")),
             timeout=_STATUS_TIMEOUT,
         )
-        found = [(reply.key, _decode(reply, LaunchStatus)) for reply in replies if reply.ok]
-        if replies and not found:
+        launches = [(reply.key, _decode(reply, LaunchStatus)) for reply in replies if reply.ok]
+        if replies and not launches:
             raise WaitTimeout("answer from a running launch", _STATUS_TIMEOUT)
-        return dict(sorted(found, key=lambda pair: (pair[1].host, pair[1].pid)))
+        return dict(sorted(launches, key=lambda pair: (pair[1].host, pair[1].pid)))
 
     def request(self, action: Literal["restart", "stop"], node: str) -> None:
         """Restart or stop a node, and wait until that is done.
-
-        Args:
-            action: The action.
-            node: Name of the node.
 
         Raises:
             NotFoundError: If no running launch has such a node.
@@ -286,12 +256,7 @@ class StatusClient:
         return [self.read_output(key, name) for key in keys]
 
     def act(self, key: str, action: Literal["restart", "stop"], node: str) -> None:
-        """Restart or stop a node of one launch, and wait until that is done.
-
-        Args:
-            key: Key of the launch.
-            action: The action.
-            node: Full name of the node.
+        """Restart or stop a node, by its full name, of one launch, and wait until that is done.
 
         Raises:
             LaunchError: If the launch refuses, or the node could not be started again.
@@ -303,12 +268,9 @@ class StatusClient:
             raise LaunchError(f"'{node}' did not start again: {after.detail}")
 
     def read_output(self, key: str, node: str, after: Position | None = None) -> Excerpt:
-        """Return output of a node of one launch.
+        """Return output of a node, by its full name, of one launch.
 
-        Args:
-            key: Key of the launch.
-            node: Full name of the node.
-            after: Position of what is known already; None for the newest output.
+        It is the output after a position that is known already, or the newest.
 
         Raises:
             LaunchError: If the launch has no such node, or has ended.
@@ -320,16 +282,16 @@ class StatusClient:
         """Return the full name of a node, and the keys of the launches that run it."""
         name = f"/{node.strip('/')}"
         running = self.running()
-        known = [entry.name for status in running.values() for entry in status.nodes]
+        names = [entry.name for status in running.values() for entry in status.nodes]
         for entry in (entry for status in running.values() for entry in status.nodes):
             if name in entry.members:
                 raise NotFoundError(
                     f"node '{name}' has no process of its own: it is in container '{entry.name}',"
                     f" which can be restarted or stopped; 'rosz node kill {name}' ends the node"
                 )
-        if name not in known:
-            listing = f"; there are {', '.join(sorted(known))}" if known else ""
-            hint = near_miss(name, known) or listing or "; no launch is running"
+        if name not in names:
+            listing = f"; there are {', '.join(sorted(names))}" if names else ""
+            hint = near_miss(name, names) or listing or "; no launch is running"
             raise NotFoundError(f"no launch runs a node '{name}'{hint}")
         return name, [
             key

@@ -1,7 +1,7 @@
 """Parts of the output of a node, read while it runs; bounded in bytes.
 
-What a node shows on the screen comes from the relay, which keeps the newest of it. What it writes
-to a file of the run's folder is read from there. A position in both tells how far a reader is.
+The output on the screen comes from the relay, which keeps the newest part. The output in a file of
+the run's folder is read from there. A position in both tells how far a reader is.
 """
 
 from __future__ import annotations
@@ -12,8 +12,6 @@ import re
 from pathlib import Path
 
 import msgspec
-
-__all__ = ("Excerpt", "Position", "make_excerpt", "read_file")
 
 MOST_BYTES = 65536
 """Largest size of each of the two halves of an excerpt, before it is text."""
@@ -31,7 +29,7 @@ class Excerpt(msgspec.Struct, frozen=True):
     Attributes:
         text: The text, without colors and other control characters.
         position: Where the next part begins.
-        skipped: Number of bytes left out, since they are older than what is kept.
+        skipped: Number of bytes left out, since they are older than the kept part.
     """
 
     text: str
@@ -39,21 +37,22 @@ class Excerpt(msgspec.Struct, frozen=True):
     skipped: int = 0
 
 
-def read_file(path: Path | None, after: int) -> tuple[int, bytes]:
+def read_file(path: Path | None, after: int, most: int = MOST_BYTES) -> tuple[int, bytes]:
     """Return the newest bytes of a file after a position, and where they begin.
 
     Args:
         path: The file; None if there is none.
         after: The position; if the file is shorter, it is a new one and is read from its start.
+        most: Largest number of bytes.
     """
     if path is None:
         return 0, b""
     try:
         with path.open("rb") as stream:
             size = os.fstat(stream.fileno()).st_size
-            begin = max(after if 0 <= after <= size else 0, size - MOST_BYTES)
+            begin = max(after if 0 <= after <= size else 0, size - most)
             stream.seek(begin)
-            return begin, stream.read(MOST_BYTES)
+            return begin, stream.read(most)
     except OSError:  # it is not there yet, or was removed
         return 0, b""
 
@@ -61,7 +60,7 @@ def read_file(path: Path | None, after: int) -> tuple[int, bytes]:
 def make_excerpt(
     file: tuple[int, bytes], screen: tuple[int, bytes], after: Position | None
 ) -> Excerpt:
-    """Return what has been read as text.
+    """Return the bytes of a file and of the screen as text.
 
     Args:
         file: Where the bytes of the file begin, and the bytes.

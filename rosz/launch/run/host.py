@@ -12,109 +12,51 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
-import msgspec
-
 from rosz.errors import LaunchError, RoszError
-from rosz.launch.plan import MachinePlan, NodePlan
-from rosz.launch.run.command import Command, Workplace
+from rosz.launch.plan import MachinePlan
+from rosz.launch.run.command import NodeCommand, Workplace
 from rosz.launch.run.excerpt import Excerpt, Position, make_excerpt, read_file
 from rosz.launch.run.loop import Loop
-from rosz.launch.run.output import Output, RunFolder, Streams
-from rosz.launch.run.process_tree import TAG, ProcessTree, Usage, group_alive
-
-__all__ = (
-    "Child",
-    "Host",
-    "LocalChild",
-    "LocalHost",
-    "OnExit",
-    "OnRead",
-    "OnStart",
-    "ProcessSpec",
-    "is_local",
+from rosz.launch.run.output import RelayedOutput, RunFolder, Streams
+from rosz.launch.run.process_tree import ProcessTree, Usage, group_alive
+from rosz.launch.run.protocol import (
+    Exited,
+    Gone,
+    ProcessReport,
+    ProcessRequest,
+    ProcessSpec,
+    Refused,
+    Start,
+    Started,
 )
 
-OnExit = Callable[[int | None, tuple[str, ...]], None]
-"""Called with the exit code, negative for a signal, and the last lines of the output.
-
-The exit code is None if it is not known, because the machine of the process is lost.
-"""
-
-OnStart = Callable[[RoszError | None], None]
-"""Called with None once a process has started, or with the reason why it could not be."""
+OnReport = Callable[[ProcessReport], object]
+"""Called on the loop with a report about a process."""
 
 OnRead = Callable[[Excerpt], None]
 """Called with output of a process."""
 
+_TAIL_BYTES, _TAIL_LINES = 4096, 12
+# Most descendants end at once; each look for the others may read the environment of all processes.
+_MIN_CHECK, _MAX_CHECK = 0.005, 0.1
 _LOCAL_NAMES = frozenset({"", "localhost", "127.0.0.1", "::1"})
 
 
-class ProcessSpec(msgspec.Struct, frozen=True):
-    """A process to start.
+class Host(Protocol):
+    """A machine that can start processes.
 
     Attributes:
-        node: The node from the plan.
-        owner: Number of the process in this launch.
-        label: Name that messages show.
-        again: Whether it ran before in this launch.
+        report: Receives what becomes of the processes.
     """
 
-    node: NodePlan
-    owner: int
-    label: str
-    again: bool = False
-
-
-class Child(Protocol):
-    """A started process with its descendants."""
-
-    @property
-    def pid(self) -> int:
-        """Process id on its machine."""
-
-    @property
-    def shown(self) -> str:
-        """Command line that messages show."""
-
-    @property
-    def logs(self) -> str:
-        """Pattern of the paths of its logs on its machine, or "" if there are none."""
-
-    @property
-    def place(self) -> str:
-        """Address of its machine, or "" for this one."""
-
-    @property
-    def pending(self) -> bool:
-        """Whether its machine has not confirmed yet that it runs."""
-
-    def signal(self, number: int) -> None:
-        """Send a signal to it and its descendants; those that have ended are ignored."""
-
-    def remains(self) -> bool:
-        """Return whether it or a descendant still runs."""
-
-
-class Host(Protocol):
-    """A machine that can start processes."""
+    report: OnReport
 
     @property
     def place(self) -> str:
         """Address, or "" for this machine."""
 
-    def start(self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart) -> Child:
-        """Start a process.
-
-        Args:
-            spec: The process.
-            on_exit: Called on the loop when the process itself has ended.
-            on_start: Called on the loop for a pending child, when it is no longer pending.
-
-        Raises:
-            PackageNotFound: If the machine has no such package.
-            ExecutableNotFound: If the package has no such executable.
-            LaunchError: If the system refuses to start it.
-        """
+    def send(self, request: ProcessRequest) -> None:
+        """Start a process, or signal one with its descendants unless they have ended."""
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
         """Call a function with the resources that the processes use, by owner."""
@@ -124,34 +66,20 @@ class Host(Protocol):
 
         Args:
             owner: Number of the process.
-            after: Position of what is known already; None for the newest output.
+            after: Position of the output that is known already; None for the newest output.
             done: Called on the loop.
         """
 
 
 class LocalChild:
-    """A process of this machine, in a session and process group of its own.
+    """A process of this machine, in a session and process group of its own."""
 
-    Args:
-        process: The process.
-        command: The command that it runs.
-        tree: The processes of this launch, to find descendants outside the group.
-        logs: Pattern of the paths of its logs.
-    """
-
-    place = ""
-    pending = False
-
-    def __init__(
-        self, process: subprocess.Popen[bytes], command: Command, tree: ProcessTree, logs: str
-    ) -> None:
-        self.logs = logs
+    def __init__(self, process: subprocess.Popen[bytes], tree: ProcessTree, tag: str) -> None:
+        self.pid = process.pid
         self._process = process
         self._tree = tree
-        self._tag = command.environ[TAG]
+        self._tag = tag
         self._group_gone = False
-        self.pid = process.pid
-        self.shown = " ".join(command.shown)
 
     def signal(self, number: int) -> None:
         """Signal the group and all descendants, except those of another user."""
@@ -180,29 +108,16 @@ class LocalChild:
     def _outside_group(self) -> list[int]:
         return [pid for pid in self._tree.below(self._tag) if _group_of(pid) != self.pid]
 
-    def reap(self) -> int:
-        """Reap the process, which has ended, and return its exit code."""
-        return self._process.wait()
-
 
 class LocalHost:
-    """This machine.
-
-    Args:
-        loop: Loop that waits for the processes.
-        output: Relay of their output.
-        workplace: Source of their commands.
-        folder: Folder of their logs, or None if logs cannot be kept.
-        tag: Tag of everything that this launch starts.
-        prefixed: Whether lines on the screen begin with the name of their node.
-    """
+    """This machine."""
 
     place = ""
 
     def __init__(
         self,
         loop: Loop,
-        output: Output,
+        output: RelayedOutput,
         workplace: Workplace,
         *,
         folder: RunFolder | None,
@@ -216,15 +131,30 @@ class LocalHost:
         self._tree = ProcessTree(tag)
         self._prefixed = prefixed
         self._files: dict[int, Path] = {}
+        self._children: dict[int, LocalChild] = {}
+        self.report: OnReport = lambda _: None
 
-    def start(
-        self,
-        spec: ProcessSpec,
-        on_exit: Callable[[int, tuple[str, ...]], None],
-        on_start: OnStart | None = None,
-    ) -> LocalChild:
-        """Start a process; see `Host.start` for the arguments and errors."""
-        del on_start  # the process runs when this returns
+    @property
+    def is_idle(self) -> bool:
+        """Whether no process or descendant runs."""
+        return not self._children
+
+    def send(self, request: ProcessRequest) -> None:
+        """Start a process, or signal one; see `Host.send`."""
+        if isinstance(request, Start):
+            try:
+                self._start(request.serial, request.job)
+            except RoszError as error:
+                self.report(Refused(request.serial, str(error)))
+        elif request.serial in self._children:
+            self._children[request.serial].signal(request.number)
+
+    def signal_all(self, number: int) -> None:
+        """Signal all processes and their descendants."""
+        for child in self._children.values():
+            child.signal(number)
+
+    def _start(self, serial: int, spec: ProcessSpec) -> None:
         log_file = self._folder.node_log(spec.label) if self._folder else None
         tag = f"{self._tree.tag}:{spec.owner}"
         command = self._workplace.command(spec.node, log_file=log_file, tag=tag)
@@ -246,14 +176,27 @@ class LocalHost:
             streams.close()
         self._output.started(spec.owner, process.pid)
         logs = self._folder.pattern(spec.label) if self._folder else ""
-        child = LocalChild(process, command, self._tree, logs)
+        self._children[serial] = LocalChild(process, self._tree, tag)
 
         def exited() -> None:
-            code = child.reap()
-            self._output.drain(spec.owner, lambda tail: on_exit(code, tail or self._logged(spec)))
+            code = process.wait()
+            self._output.drain(spec.owner, lambda tail: ended(code, tail or self._logged(spec)))
+
+        def ended(code: int, tail: tuple[str, ...]) -> None:
+            self.report(Exited(serial, code, tail))
+            self._check_gone(serial, _MIN_CHECK)
 
         self._loop.watch_exit(process.pid, exited)
-        return child
+        self.report(Started(serial, process.pid, " ".join(command.shown), logs))
+
+    def _check_gone(self, serial: int, interval: float) -> None:
+        """Report when a process and all its descendants have ended."""
+        if self._children[serial].remains():
+            longer = min(2 * interval, _MAX_CHECK)
+            self._loop.later(interval, lambda: self._check_gone(serial, longer))
+        else:
+            del self._children[serial]
+            self.report(Gone(serial))
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
         """Call a function with the resources that the processes use, by owner."""
@@ -263,18 +206,19 @@ class LocalHost:
 
     def read_output(self, owner: int, after: Position | None, done: OnRead) -> None:
         """Call a function with the newest output of a process; see `Host.read_output`."""
-        known = after or (0, 0)
+        position = after or (0, 0)
 
-        def shown(begin: int, data: bytes) -> None:
-            file = read_file(self._files.get(owner), known[0])
-            done(make_excerpt(file, (begin, data), after))
+        def shown(screen: tuple[int, bytes]) -> None:
+            file = read_file(self._files.get(owner), position[0])
+            done(make_excerpt(file, screen, after))
 
-        self._output.read(owner, known[1], shown)
+        self._output.read(owner, position[1], shown)
 
-    def _open_streams(self, spec: ProcessSpec, command: Command) -> Streams:
+    def _open_streams(self, spec: ProcessSpec, command: NodeCommand) -> Streams:
         prefix = f"[{spec.label}] " if self._prefixed else ""
         if command.direct and os.isatty(0):
-            return self._output.direct()
+            # A debugger needs the streams of the launch itself.
+            return Streams(None, None, None, terminal=os.isatty(1))
         shown = spec.node.output == "screen"
         file = self._folder.stdout_log(spec.label) if self._folder and not shown else None
         try:
@@ -290,10 +234,11 @@ class LocalHost:
             ) from error
 
     def _logged(self, spec: ProcessSpec) -> tuple[str, ...]:
-        """Return the last lines that a process wrote to its file."""
         if self._folder is None or spec.node.output == "screen":
             return ()
-        return _last_lines(self._folder.stdout_log(spec.label))
+        _, data = read_file(self._folder.stdout_log(spec.label), 0, _TAIL_BYTES)
+        lines = [line.rstrip() for line in data.decode(errors="replace").splitlines()]
+        return tuple([line for line in lines if line][-_TAIL_LINES:])
 
 
 def is_local(machine: MachinePlan | None) -> bool:
@@ -305,17 +250,22 @@ def is_local(machine: MachinePlan | None) -> bool:
         return True
     if machine.user and machine.user != getpass.getuser():
         return False
-    address = machine.address.lower()
+    return is_local_address(machine.address)
+
+
+def is_local_address(address: str) -> bool:
+    """Return whether a name or address is that of this machine."""
+    address = address.lower()
     return address in _LOCAL_NAMES or address == socket.gethostname().lower() or _is_own(address)
 
 
 def _is_own(address: str) -> bool:
     """Return whether a name or address belongs to an interface of this machine."""
     try:
-        found = socket.getaddrinfo(address, 0, type=socket.SOCK_DGRAM)
+        addresses = socket.getaddrinfo(address, 0, type=socket.SOCK_DGRAM)
     except OSError:  # an unknown name; the user's ssh configuration may define it
         return False
-    for family, kind, _, _, place in found:
+    for family, kind, _, _, place in addresses:
         with socket.socket(family, kind) as probe, suppress(OSError):
             probe.bind(place)
             return True
@@ -332,7 +282,7 @@ def _make_folder(cwd: str) -> None:
         ) from error
 
 
-def _with_line_buffering(command: Command, streams: Streams) -> Mapping[str, str]:
+def _with_line_buffering(command: NodeCommand, streams: Streams) -> Mapping[str, str]:
     """Return variables that make a Python program not run by rosz write lines at once."""
     if command.python or streams.terminal:
         return command.environ
@@ -347,7 +297,9 @@ def _group_of(pid: int) -> int:
         return 0
 
 
-def _start_error(spec: ProcessSpec, command: Command, error: OSError | ValueError) -> LaunchError:
+def _start_error(
+    spec: ProcessSpec, command: NodeCommand, error: OSError | ValueError
+) -> LaunchError:
     number = error.errno if isinstance(error, OSError) else None
     if number == errno.ENOEXEC:
         return LaunchError(
@@ -362,14 +314,3 @@ def _start_error(spec: ProcessSpec, command: Command, error: OSError | ValueErro
         hint = "; does its first line name an interpreter that is installed?"
     shown = " ".join(command.shown)
     return LaunchError(f"unable to launch [{spec.label}]: {reason}: {shown}{hint}")
-
-
-def _last_lines(file: Path, count: int = 12, size: int = 4096) -> tuple[str, ...]:
-    try:
-        with file.open("rb") as stream:
-            stream.seek(max(0, os.fstat(stream.fileno()).st_size - size))
-            data = stream.read(size)
-    except OSError:  # there is no file
-        return ()
-    lines = [line.rstrip() for line in data.decode(errors="replace").splitlines()]
-    return tuple([line for line in lines if line][-count:])

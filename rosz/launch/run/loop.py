@@ -19,8 +19,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-__all__ = ("Loop", "Timer", "interrupted_by_signals", "stopped_by_signals")
-
 Action = Callable[[], None]
 
 _MAX_WAIT = 3600.0
@@ -29,12 +27,8 @@ _MAX_WAIT = 3600.0
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
-class Timer:
-    """A function that will be called once, unless cancelled.
-
-    Args:
-        action: The function.
-    """
+class LoopTimer:
+    """A function that will be called once, unless cancelled."""
 
     __slots__ = ("action",)
 
@@ -51,7 +45,7 @@ class Loop:
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
-        self._timers: list[tuple[float, int, Timer]] = []
+        self._timers: list[tuple[float, int, LoopTimer]] = []
         self._order = itertools.count()
         self._posted: deque[Action] = deque()
         self._children: set[int] = set()
@@ -65,9 +59,9 @@ class Loop:
         """Return the time that timers use, in seconds."""
         return time.monotonic()
 
-    def later(self, seconds: float, action: Action) -> Timer:
+    def later(self, seconds: float, action: Action) -> LoopTimer:
         """Call a function after a delay in seconds."""
-        timer = Timer(action)
+        timer = LoopTimer(action)
         heapq.heappush(self._timers, (self.now() + seconds, next(self._order), timer))
         return timer
 
@@ -180,9 +174,6 @@ def stopped_by_signals(
         kill: Called at each further signal, and at SIGQUIT.
         dump_stacks: Called in the signal handler before ``kill``, with the name of the signal.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     seen = threading.Event()
 
     def handle(number: int, _frame: object) -> None:
@@ -200,7 +191,7 @@ def stopped_by_signals(
 
 @contextmanager
 def interrupted_by_signals() -> Iterator[None]:
-    """Let these signals raise `KeyboardInterrupt`, so that what has been started is ended.
+    """Let these signals raise `KeyboardInterrupt`, so that started processes are ended.
 
     Inside `stopped_by_signals`, the handlers of that one count.
     """
@@ -208,9 +199,6 @@ def interrupted_by_signals() -> Iterator[None]:
     def handle(_number: int, _frame: object) -> None:
         raise KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     with _handled_by(handle):
         yield
 
@@ -218,7 +206,8 @@ def interrupted_by_signals() -> Iterator[None]:
 @contextmanager
 def _handled_by(handle: Callable[[int, Any], None]) -> Iterator[None]:
     before: dict[signal.Signals, Any] = {}
-    for number in _SIGNALS:
+    is_main = threading.current_thread() is threading.main_thread()
+    for number in _SIGNALS if is_main else ():
         if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
             before[number] = signal.signal(number, handle)
     try:

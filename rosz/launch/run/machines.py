@@ -20,14 +20,6 @@ from rosz.errors import UsageError, near_miss
 from rosz.launch.plan import MachinePlan, Place, Plan
 from rosz.wire import Endpoint
 
-__all__ = (
-    "MachineOption",
-    "launch_endpoints",
-    "move_machines",
-    "ssh_command",
-    "ssh_failure",
-)
-
 _OPTION = re.compile(
     r"(?:(?P<name>[^=@]+)=)?(?:(?P<user>[^@]+)@)?"
     r"(?P<address>\[[^]]+\]|[^-@:=\s][^@:=\s]*)(?::(?P<port>[0-9]{1,5}))?"
@@ -110,14 +102,14 @@ def _set_default(plan: Plan, option: MachineOption) -> Plan:
 def _set_address(plan: Plan, option: MachineOption) -> Plan:
     """Return the plan with another address for a machine that the files declare."""
     declared = {machine.name: machine for machine in plan.machines}
-    known = declared.get(option.name)
-    if known is None:
+    before = declared.get(option.name)
+    if before is None:
         hint = near_miss(option.name, declared) or f"; they declare {', '.join(declared) or 'none'}"
         raise UsageError(f"--machine: no file declares a machine '{option.name}'{hint}")
     fresh = msgspec.structs.replace(
-        known, address=option.address, ssh_port=option.port, user=option.user or known.user
+        before, address=option.address, ssh_port=option.port, user=option.user or before.user
     )
-    machines = tuple(fresh if machine is known else machine for machine in plan.machines)
+    machines = tuple(fresh if machine is before else machine for machine in plan.machines)
     return msgspec.structs.replace(plan, machines=machines)
 
 
@@ -127,7 +119,7 @@ def launch_endpoints(environment: Environment) -> tuple[str, ...]:
     An endpoint without an address, such as ``tcp/:7447``, is on this machine, under the address by
     which the other machine knows it.
     """
-    found = []
+    endpoints = []
     for text in (*environment.listen, environment.rendezvous):
         endpoint = Endpoint(text)
         if not endpoint.is_tcp:
@@ -135,19 +127,18 @@ def launch_endpoints(environment: Environment) -> tuple[str, ...]:
         if endpoint.is_any_address or endpoint.is_local:
             # Certificates are issued for a name, and rarely for an address.
             names = [socket.gethostname()] if environment.keys is not None else []
-            found += [f"{endpoint.protocol}/{name}:{endpoint.port}" for name in (*names, "")]
+            endpoints += [f"{endpoint.protocol}/{name}:{endpoint.port}" for name in (*names, "")]
         else:
-            found.append(text)
-    found += [text for text in environment.connect if "/localhost" not in text]
-    return tuple(dict.fromkeys(found))
+            endpoints.append(text)
+    endpoints += [text for text in environment.connect if "/localhost" not in text]
+    return tuple(dict.fromkeys(endpoints))
 
 
 def ssh_command(machine: MachinePlan, silence: float) -> list[str]:
     """Return the command that starts an agent on a machine.
 
-    Args:
-        machine: The machine. Without an env-loader, a login shell sets up the environment.
-        silence: Time in seconds without an answer after which the connection counts as dead.
+    Without an env-loader, a login shell sets up the environment. After ``silence`` seconds without
+    an answer the connection counts as dead.
     """
     command = ["ssh", "-T", "-o", "BatchMode=yes"]
     command += ["-o", f"ConnectTimeout={math.ceil(machine.timeout)}"]
@@ -165,13 +156,7 @@ def ssh_command(machine: MachinePlan, silence: float) -> list[str]:
 
 
 def ssh_failure(machine: MachinePlan, code: int, output: str) -> str:
-    """Return why there is no agent on a machine, and what to do.
-
-    Args:
-        machine: The machine.
-        code: Exit code of ssh.
-        output: Error output of ssh and of the other machine.
-    """
+    """Return the reason why an agent did not start on a machine, and the remedy."""
     address = machine.address
     by_hand = " ".join(
         [

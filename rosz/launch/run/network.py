@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
@@ -26,24 +26,13 @@ from rosz.launch.plan import Condition, Plan, SetupPlan
 from rosz.launch.run.console import Console
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.process_tree import TAG
+from rosz.lifecycle import Closing
 from rosz.params import DELETED, Change, condense, normalise, split
 from rosz.session import Session, is_listening
 
 if TYPE_CHECKING:
     from rosz.node import Context
     from rosz.params.replica import Replica
-
-__all__ = (
-    "MESH_LIMIT",
-    "RUN_ID",
-    "Network",
-    "RouterProcess",
-    "core_params",
-    "launch_uri",
-    "needs_router",
-    "set_params",
-    "write_params",
-)
 
 RUN_ID: Final = "/run_id"
 
@@ -71,9 +60,7 @@ class Network:
 
     Attributes:
         session: The session that replies to requests about the launch, or None.
-        domain: The ROS domain.
         alone: Whether no other process holds the parameters.
-        router: The router, or None.
     """
 
     def __init__(self, context: Context, router: RouterProcess | None = None) -> None:
@@ -133,10 +120,7 @@ class Network:
 def write_params(replica: Replica, values: Mapping[str, Any], deleted: Iterable[str] = ()) -> None:
     """Delete some parameters, then set some, as one change.
 
-    Args:
-        replica: The replica to write to.
-        values: Values by global name.
-        deleted: Global names; those that are not set are ignored.
+    The names are global; deleted ones that are not set are ignored.
 
     Raises:
         ParamError: If a value is not a parameter value; nothing has changed then.
@@ -153,20 +137,12 @@ def write_params(replica: Replica, values: Mapping[str, Any], deleted: Iterable[
 
 
 def core_params(run_id: str) -> dict[str, Any]:
-    """Return the parameters that a ROS 1 core sets when it starts.
-
-    Args:
-        run_id: Id of the run.
-    """
+    """Return the parameters that a ROS 1 core sets when it starts."""
     return {RUN_ID: run_id, "/rosdistro": _ROSDISTRO, "/rosversion": _ROSVERSION}
 
 
 def launch_uri(pid: int) -> dict[str, Any]:
-    """Return the parameter that shows a running launch.
-
-    Args:
-        pid: Process id of the launch.
-    """
+    """Return the parameter that shows a running launch."""
     host = socket.gethostname()
     name = re.sub(r"[^a-z0-9]", "_", host.lower())
     return {f"/roslaunch/uris/host_{name}__{pid}": f"rosz://{host}/{pid}"}
@@ -174,12 +150,6 @@ def launch_uri(pid: int) -> dict[str, Any]:
 
 def set_params(plan: Plan, network: Network, console: Console, extra: Mapping[str, Any]) -> None:
     """Do the setup steps of a plan, then clear and set its parameters as one change.
-
-    Args:
-        plan: The plan.
-        network: The parameters to write to.
-        console: Output for reports.
-        extra: Parameters of the launch itself by name.
 
     Raises:
         LaunchError: If a file cannot be written.
@@ -239,11 +209,6 @@ def needs_router(nodes: int, environment: Environment, environ: Mapping[str, str
     that they send to each other would pass through that machine, and end with the connection. It
     should not if the user has chosen a mode or a Zenoh configuration, or if another process already
     listens at the rendezvous.
-
-    Args:
-        nodes: Number of nodes that the launch starts.
-        environment: Settings.
-        environ: Environment variables.
     """
     dials = bool(nodes and environment.connect and not environment.listen)
     return (
@@ -254,12 +219,8 @@ def needs_router(nodes: int, environment: Environment, environ: Mapping[str, str
     )
 
 
-class RouterProcess:
+class RouterProcess(Closing):
     """A ``rosz core`` process that listens at the rendezvous.
-
-    Args:
-        environment: Settings.
-        environ: Environment variables.
 
     Attributes:
         environment: Settings of its clients.
@@ -344,9 +305,3 @@ class RouterProcess:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -23,10 +23,8 @@ from typing import Any, Literal
 import msgspec
 
 from rosz.errors import LaunchError
-from rosz.launch.run.loop import Loop, Timer
+from rosz.launch.run.loop import Loop, LoopTimer
 from rosz.launch.run.process_tree import TAG
-
-__all__ = ("Output", "RunFolder", "Streams")
 
 _DRAIN_TIMEOUT = 0.5
 """Time in seconds to wait for the last lines of a process before its end is reported."""
@@ -39,17 +37,9 @@ _READ_TIMEOUT = 4.0
 _SEND_TIMEOUT = 0.5
 """Time in seconds for the relay to receive a request, unless the last one failed."""
 
-_OnDrained = Callable[[tuple[str, ...]], None]
-_OnRead = Callable[[int, bytes], None]
-
 
 class RunFolder:
-    """The log folder of one run, ``<log folder>/<run id>``, and the link ``latest`` to it.
-
-    Args:
-        log_dir: Log folder.
-        run_id: Id of the run.
-    """
+    """The log folder of one run, ``<log folder>/<run id>``, and the link ``latest`` to it."""
 
     def __init__(self, log_dir: Path, run_id: str) -> None:
         self.path = log_dir / run_id
@@ -98,11 +88,7 @@ def _file_name(label: str) -> str:
 class Streams(msgspec.Struct, frozen=True):
     """The descriptors for a process about to start, to be closed once it has started.
 
-    Attributes:
-        stdin: Descriptor to read from, or None for that of the launch.
-        stdout: Descriptor to write to, or None for that of the launch.
-        stderr: Descriptor to write errors to, or None for that of the launch.
-        terminal: Whether the process writes to a terminal.
+    None stands for the descriptor of the launch.
     """
 
     stdin: int | None
@@ -117,21 +103,14 @@ class Streams(msgspec.Struct, frozen=True):
                 os.close(fd)
 
 
-class Output:
-    """The launch's side of the relay process.
-
-    Args:
-        loop: Loop that waits for its replies.
-        warn: Function that reports its death.
-        tag: Tag of all nodes, which the relay ends when this process is killed.
-    """
+class RelayedOutput:
+    """The launch's side of the relay process."""
 
     def __init__(self, loop: Loop, warn: Callable[[str], None], tag: str) -> None:
         self._loop = loop
         self._warn = warn
         self._tag = tag
-        self._waiting: dict[int, tuple[_OnDrained, Timer]] = {}
-        self._reading: dict[int, tuple[_OnRead, Timer]] = {}
+        self._waiting: dict[tuple[str, int], tuple[Callable[[Any], None], LoopTimer]] = {}
         self._numbers = itertools.count()
         self._unread = b""
         self._terminals = (os.isatty(1), os.isatty(2))
@@ -157,12 +136,7 @@ class Output:
         self._loop.watch(self._requests.fileno(), self._receive)
 
     def screen(self, owner: int, prefix: str) -> Streams:
-        """Return streams for a process whose output is shown on the screen.
-
-        Args:
-            owner: Number of the process, for `drain`.
-            prefix: Text to put before each line.
-        """
+        """Return streams for a process whose output is shown on the screen."""
         if all(self._terminals) and self._same:
             terminal = self._terminal(owner, 1, prefix)
             if terminal is not None:
@@ -174,11 +148,7 @@ class Output:
     def log(self, owner: int, prefix: str, file: Path | None, mode: Literal["w", "a"]) -> Streams:
         """Return streams for a process whose standard output goes to a file, and errors are shown.
 
-        Args:
-            owner: Number of the process, for `drain`.
-            prefix: Text to put before each line on the screen.
-            file: Path of the file, or None to discard the output.
-            mode: ``w`` to replace the file, ``a`` to append.
+        Without a file the output is discarded.
 
         Raises:
             OSError: If the file cannot be written.
@@ -190,17 +160,15 @@ class Output:
             err = self._pipe(owner, 2, prefix)
         return Streams(_input(), out, err, terminal=False)
 
-    @staticmethod
-    def direct() -> Streams:
-        """Return the streams of the launch itself, which a debugger in the same terminal needs."""
-        return Streams(None, None, None, terminal=os.isatty(1))
-
     def _terminal(self, owner: int, sink: int, prefix: str) -> int | None:
         try:
             ours, theirs = os.openpty()
         except OSError:  # no terminal available: a pipe works, without colours
             return None
-        _pass_through(theirs)
+        # It passes bytes unchanged: no echo, no translation of line ends.
+        settings = termios.tcgetattr(theirs)
+        settings[0] = settings[1] = settings[3] = 0
+        termios.tcsetattr(theirs, termios.TCSANOW, settings)
         with contextlib.suppress(OSError):
             size = fcntl.ioctl(sink, termios.TIOCGWINSZ, b"\0" * 8)
             fcntl.ioctl(theirs, termios.TIOCSWINSZ, size)
@@ -240,7 +208,7 @@ class Output:
         self._send({"op": "child", "id": owner, "pid": pid}, process)
         os.close(process)
 
-    def drain(self, owner: int, done: _OnDrained) -> None:
+    def drain(self, owner: int, done: Callable[[tuple[str, ...]], None]) -> None:
         """Show all that a process wrote, then call a function with its last lines.
 
         Args:
@@ -248,34 +216,35 @@ class Output:
             done: Called on the loop, after half a second at the latest once the relay has started.
         """
         timeout = _DRAIN_TIMEOUT if self._ready else _RELAY_TIMEOUT
-        timer = self._loop.later(timeout, lambda: self._drained(owner, ()))
-        self._waiting[owner] = (done, timer)
-        self._send({"op": "drain", "id": owner})
+        self._request({"op": "drain", "id": owner}, timeout, ("id", owner), done, ())
 
-    def _drained(self, owner: int, tail: tuple[str, ...]) -> None:
-        done, timer = self._waiting.pop(owner, (None, None))
-        if done is not None and timer is not None:
-            timer.cancel()
-            done(tail)
+    def read(self, owner: int, after: int, done: Callable[[tuple[int, bytes]], None]) -> None:
+        """Call a function on the loop with the newest output of a process: its begin, and the data.
 
-    def read(self, owner: int, after: int, done: _OnRead) -> None:
-        """Call a function with what is kept of the shown output of a process.
-
-        Args:
-            owner: Number of the process.
-            after: Number of bytes that are known already.
-            done: Called on the loop with the number of bytes before the data, and the data.
+        The relay keeps a part of the output; bytes up to ``after`` are left out.
         """
         number = next(self._numbers)
-        timer = self._loop.later(_READ_TIMEOUT, lambda: self._have_read(number, after, b""))
-        self._reading[number] = (done, timer)
-        self._send({"op": "read", "id": owner, "after": after, "number": number})
+        request = {"op": "read", "id": owner, "after": after, "number": number}
+        self._request(request, _READ_TIMEOUT, ("read", number), done, (after, b""))
 
-    def _have_read(self, number: int, begin: int, data: bytes) -> None:
-        done, timer = self._reading.pop(number, (None, None))
-        if done is not None and timer is not None:
+    def _request(
+        self,
+        request: dict[str, Any],
+        timeout: float,
+        key: tuple[str, int],
+        done: Callable[[Any], None],
+        missing: Any,
+    ) -> None:
+        """Send a request, and call a function with its reply, or after a time with a substitute."""
+        timer = self._loop.later(timeout, lambda: self._answer(key, missing))
+        self._waiting[key] = done, timer
+        self._send(request)
+
+    def _answer(self, key: tuple[str, int], reply: Any) -> None:
+        if key in self._waiting:
+            done, timer = self._waiting.pop(key)
             timer.cancel()
-            done(begin, data)
+            done(reply)
 
     def _receive(self) -> None:
         try:
@@ -290,9 +259,9 @@ class Output:
             reply = json.loads(line)
             if "read" in reply:
                 data = base64.b64decode(reply["data"])
-                self._have_read(reply["read"], reply["begin"], data)
+                self._answer(("read", reply["read"]), (reply["begin"], data))
             elif reply:
-                self._drained(reply["id"], tuple(reply["tail"]))
+                self._answer(("id", reply["id"]), tuple(reply["tail"]))
 
     def _restart(self) -> None:
         """Start the relay again after its death, unless it died right after its start."""
@@ -337,10 +306,3 @@ def _same_file(first: int, second: int) -> bool:
         return os.path.sameopenfile(first, second)
     except OSError:
         return False
-
-
-def _pass_through(terminal: int) -> None:
-    """Make a terminal pass bytes unchanged: no echo, no translation of line ends."""
-    settings = termios.tcgetattr(terminal)
-    settings[0] = settings[1] = settings[3] = 0
-    termios.tcsetattr(terminal, termios.TCSANOW, settings)

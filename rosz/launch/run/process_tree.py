@@ -1,4 +1,4 @@
-"""The processes of a launch, found by what descendants inherit.
+"""The processes of a launch, found by a variable that descendants inherit.
 
 Everything that a launch starts carries a tag in its environment, which descendants inherit. Where
 the system shows environments (``/proc``), a `ProcessTree` finds them by it, also those that left
@@ -18,8 +18,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ("TAG", "ProcessTree", "Usage", "end_processes", "group_alive")
-
 TAG = "ROSZ_LAUNCH"
 """Environment variable with the tag by which descendants of a launched process are found."""
 
@@ -27,7 +25,7 @@ _PROC = Path("/proc")
 _TICKS = os.sysconf("SC_CLK_TCK")
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _STATE, _GROUP, _UTIME, _STIME, _VSIZE, _RSS = 0, 2, 11, 12, 20, 21
-_CACHE_SECONDS = 0.05
+_CACHE_SECONDS = 0.05  # a scan reads the environment of every process of the machine
 _KILL_ATTEMPTS, _KILL_INTERVAL = 10, 0.002
 """How often to look again for processes without an environment; some never have one."""
 _GRACE_SECONDS = 0.75
@@ -50,11 +48,7 @@ class Usage:
 
 
 class ProcessTree:
-    """The processes that carry a tag, or one below it, in their environment.
-
-    Args:
-        tag: The tag.
-    """
+    """The processes that carry a tag, or one below it, in their environment."""
 
     def __init__(self, tag: str) -> None:
         self.tag = tag
@@ -77,8 +71,8 @@ class ProcessTree:
         killed: set[int] = set()
         attempts = _KILL_ATTEMPTS
         while attempts:
-            found, unclear = self._scan()
-            fresh = set(found) - killed
+            tags, unclear = self._scan()
+            fresh = set(tags) - killed
             for pid in fresh:
                 _send(pid, signal.SIGKILL)
             killed |= fresh
@@ -107,7 +101,7 @@ class ProcessTree:
 
         That is so in the instant in which a process executes another program.
         """
-        found: dict[int, str] = {}
+        tags: dict[int, str] = {}
         unclear = False
         name = TAG.encode() + b"="
         wanted = name + self.tag.encode()
@@ -121,8 +115,8 @@ class ProcessTree:
                 for variable in environ.split(b"\0"):
                     tag = variable.removeprefix(name).decode(errors="replace")
                     if variable.startswith(wanted) and _is_below(tag, self.tag):
-                        found[int(pid)] = tag
-        return found, unclear
+                        tags[int(pid)] = tag
+        return tags, unclear
 
 
 def end_processes(tag: str, groups: Collection[int]) -> None:
@@ -138,10 +132,10 @@ def end_processes(tag: str, groups: Collection[int]) -> None:
         signalled: set[int] = set()
         # A process may appear at any moment; one that was being started shows no tag yet.
         while time.monotonic() < deadline:
-            found = {*tree.tags(), *_members(groups)} - signalled
-            for pid in found:
+            pids = {*tree.tags(), *_members(groups)} - signalled
+            for pid in pids:
                 _send(pid, number)
-            signalled |= found
+            signalled |= pids
             time.sleep(_CACHE_SECONDS)
     tree.kill()
     for pid in _members(groups):
@@ -155,7 +149,6 @@ def _send(pid: int, number: signal.Signals) -> None:
 
 
 def _members(groups: Collection[int]) -> list[int]:
-    """Return the running processes of process groups."""
     return [int(pid) for pid in _processes() if any(_runs_in(pid, group) for group in groups)]
 
 

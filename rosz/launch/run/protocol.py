@@ -1,70 +1,65 @@
-"""The messages between a launch and its agent on another machine: JSON, one per line, over pipes.
+"""The requests of a launch to the machines of its nodes, and their reports.
 
-The launch sends `Setup` first, then its other requests. The agent sends `AgentVersion` as soon as
-it runs. Anything before that is text that the other machine prints at a login.
+Those to another machine are JSON, one per line, over the pipes of its agent. The launch sends
+`AgentSetup` first, then its other requests. The agent sends `AgentVersion` as soon as it runs.
+Anything before that is text that the other machine prints at a login.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
 import msgspec
 
+from rosz.launch.plan import NodePlan
 from rosz.launch.run.excerpt import Excerpt, Position
-from rosz.launch.run.host import ProcessSpec
 from rosz.launch.run.process_tree import Usage
-from rosz.launch.run.supervisor import Timeouts
 from rosz.worker import Worker
-
-__all__ = (
-    "PROTOCOL",
-    "AgentVersion",
-    "AgentWarning",
-    "Exited",
-    "Gone",
-    "LineReader",
-    "Measure",
-    "Measured",
-    "MessageWriter",
-    "OutputRead",
-    "Ping",
-    "ReadOutput",
-    "Ready",
-    "Refused",
-    "Report",
-    "Request",
-    "Setup",
-    "Shown",
-    "Signal",
-    "Start",
-    "Started",
-    "rosz_version",
-)
 
 PROTOCOL: Final = 2
 """Version of the messages; it changes when an older side would not understand a newer one."""
 
 _CHUNK = 65536
-_MAX_LINE = 64 * 1024 * 1024
+_MAX_LINE = 64 * 1024 * 1024  # a login that prints without line ends must not fill the memory
 _CAPACITY = 1024 * 1024
 """Number of waiting bytes at which a writer is full."""
 
 
-class Setup(msgspec.Struct, frozen=True, tag="setup"):
+class Timeouts(msgspec.Struct, frozen=True):
+    """The time that processes have to end.
+
+    Attributes:
+        sigint: Time from SIGINT to SIGTERM in seconds.
+        sigterm: Time from SIGTERM to SIGKILL in seconds.
+    """
+
+    sigint: float = 15.0
+    sigterm: float = 2.0
+
+
+class ProcessSpec(msgspec.Struct, frozen=True):
+    """A process to start.
+
+    Attributes:
+        owner: Number of the process in this launch.
+        again: Whether it ran before in this launch.
+    """
+
+    node: NodePlan
+    owner: int
+    label: str
+    again: bool = False
+
+
+class AgentSetup(msgspec.Struct, frozen=True, tag="setup"):
     """The settings of the launch that an agent needs.
 
     Attributes:
-        run_id: Id of the run, which is the name of the log folder.
-        tag: Tag of everything that the agent starts.
-        domain: ROS domain.
         meet: Endpoints where the launch may be found; those without an address, such as
             ``tcp/:7447``, are on the machine from which the agent was started.
         silence: Time in seconds without a message from the launch after which it counts as dead.
-        timeouts: Time that processes have to end.
-        prefixed: Whether lines begin with the name of their node.
     """
 
     run_id: str
@@ -77,12 +72,7 @@ class Setup(msgspec.Struct, frozen=True, tag="setup"):
 
 
 class Start(msgspec.Struct, frozen=True, tag="start"):
-    """A request to start a process.
-
-    Attributes:
-        serial: Number of the process in all later messages, never used again.
-        job: The process.
-    """
+    """A request to start a process, whose number is never used again."""
 
     serial: int
     job: ProcessSpec
@@ -104,30 +94,19 @@ class Measure(msgspec.Struct, frozen=True, tag="measure"):
 
 
 class ReadOutput(msgspec.Struct, frozen=True, tag="read"):
-    """A request for the newest output of a process.
-
-    Attributes:
-        number: Number of the request.
-        owner: Number of the process in its launch.
-        after: Position of what is known already.
-    """
+    """A request for the newest output of a process."""
 
     number: int
     owner: int
     after: Position | None
 
 
-Request = Setup | Start | Signal | Ping | Measure | ReadOutput
+ProcessRequest = Start | Signal
+Request = AgentSetup | ProcessRequest | Ping | Measure | ReadOutput
 
 
 class AgentVersion(msgspec.Struct, frozen=True, tag="hello"):
-    """The report that the agent runs.
-
-    Attributes:
-        protocol: `PROTOCOL` of the agent.
-        version: Version of rosz there.
-        host: Host name of the machine.
-    """
+    """The report that the agent runs, with the `PROTOCOL` and the version of rosz there."""
 
     protocol: int
     version: str
@@ -135,7 +114,7 @@ class AgentVersion(msgspec.Struct, frozen=True, tag="hello"):
 
 
 class Ready(msgspec.Struct, frozen=True, tag="ready"):
-    """The report that the agent has handled `Setup`.
+    """The report that the agent has handled `AgentSetup`.
 
     Attributes:
         reaches: Endpoint that its nodes connect to, or "" if they will not find this launch.
@@ -154,10 +133,9 @@ class Started(msgspec.Struct, frozen=True, tag="started"):
     """The report that a process runs.
 
     Attributes:
-        serial: Number of the process.
-        pid: Process id there.
+        pid: Process id on its machine.
         shown: Command line that messages show.
-        logs: Pattern of the paths of its logs there, or "" if there are none.
+        logs: Pattern of the paths of its logs on its machine, or "" if there are none.
     """
 
     serial: int
@@ -181,10 +159,16 @@ class Shown(msgspec.Struct, frozen=True, tag="shown"):
 
 
 class Exited(msgspec.Struct, frozen=True, tag="exited"):
-    """The report that a process has ended; descendants may still run."""
+    """The report that a process has ended; descendants may still run.
+
+    Attributes:
+        code: Exit code, negative for a signal; None if it is not known, because the machine of the
+            process is lost.
+        tail: The last lines of the output.
+    """
 
     serial: int
-    code: int
+    code: int | None
     tail: tuple[str, ...]
 
 
@@ -207,18 +191,8 @@ class OutputRead(msgspec.Struct, frozen=True, tag="output"):
     excerpt: Excerpt
 
 
-Report = (
-    AgentVersion
-    | Ready
-    | AgentWarning
-    | Started
-    | Refused
-    | Shown
-    | Exited
-    | Gone
-    | Measured
-    | OutputRead
-)
+ProcessReport = Started | Refused | Exited | Gone
+Report = AgentVersion | Ready | AgentWarning | ProcessReport | Shown | Measured | OutputRead
 
 
 def rosz_version() -> str:
@@ -231,31 +205,21 @@ def rosz_version() -> str:
         return "unknown"
 
 
-class MessageWriter:
+class MessageWriter(Worker[bytes]):
     """Writes messages to a pipe in order, on a thread, as the pipe may be slow or blocked.
 
-    Args:
-        fd: Descriptor of the pipe; the writer closes it at the end.
+    It closes the pipe at the end.
     """
 
     def __init__(self, fd: int) -> None:
+        super().__init__("rosz messages", self._write, capacity=_CAPACITY, size=len)
         self._fd = fd
         self._broken = False
         self._encoder = msgspec.json.Encoder()
-        self._worker = Worker[bytes]("rosz messages", self._write, capacity=_CAPACITY, size=len)
-
-    @property
-    def full(self) -> bool:
-        """Whether so much waits that less urgent messages should wait."""
-        return self._worker.full
-
-    def when_free(self, callback: Callable[[], None]) -> None:
-        """Call a function once, here or on the thread, when the writer is not full."""
-        self._worker.when_free(callback)
 
     def send(self, message: msgspec.Struct) -> None:
         """Send a message as soon as possible; it is lost if nobody reads any more."""
-        self._worker.submit(self._encoder.encode(message) + b"\n")
+        self.submit(self._encoder.encode(message) + b"\n")
 
     def _write(self, line: bytes) -> None:
         if self._broken:
@@ -271,23 +235,19 @@ class MessageWriter:
             with suppress(OSError):
                 os.close(self._fd)
 
-    def close(self, timeout: float) -> None:
-        """Send what waits for at most ``timeout`` seconds, and close the pipe.
+    def close(self, timeout: float = 0.0) -> None:
+        """Send waiting messages for at most ``timeout`` seconds, and close the pipe.
 
         A second call only waits.
         """
-        self._worker.submit(b"")
-        self._worker.close(timeout)
+        self.submit(b"")
+        super().close(timeout)
 
 
 class LineReader:
     """Reads lines from a pipe without blocking.
 
-    Args:
-        fd: Descriptor to read.
-
     Attributes:
-        fd: The descriptor.
         ended: Whether the pipe has ended.
     """
 

@@ -10,8 +10,8 @@ Requests arrive on a stream socket, one JSON object per line, together with desc
     {"op": "add", "id": 7, "sink": 1, "prefix": "[talker] "}     with the descriptor to read
     {"op": "child", "id": 7, "pid": 4711}    with a descriptor of the process, which has started
     {"op": "drain", "id": 7}     the reply, once all is read, is {"id": 7, "tail": […]}
-    {"op": "read", "id": 7, "after": 0, "number": 3}     the reply, what is kept of the output
-        after that many bytes, is {"read": 3, "begin": 0, "data": "…"} in base64
+    {"op": "read", "id": 7, "after": 0, "number": 3}     the reply, the kept output after
+        that many bytes, is {"read": 3, "begin": 0, "data": "…"} in base64
     {"op": "end"}                drain all, then end
 
 The first line that it sends is ``{}``: it has started.
@@ -37,8 +37,6 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-__all__ = ("Newest", "Relay", "Source", "main")
-
 CHUNK = 65536
 MAX_LINE = 65536
 PARTIAL_SECONDS = 0.05
@@ -53,19 +51,12 @@ _ESCAPES = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\
 
 
 class Source:
-    """A descriptor that nodes write to.
-
-    Args:
-        fd: Descriptor to read.
-        owner: Number of the process.
-        sink: Descriptor to write to, 1 or 2.
-        prefix: Text to put before each line.
-    """
+    """A descriptor that nodes write to."""
 
     def __init__(self, fd: int, owner: int, sink: int, prefix: bytes) -> None:
         self.fd = fd
         self.owner = owner
-        self.sink = sink
+        self.sink = sink  # 1 or 2
         self.prefix = prefix
         self.partial = b""
         self.since = 0.0
@@ -107,7 +98,7 @@ class Newest:
             del self.data[:-MAX_KEPT]
 
     def after(self, position: int) -> tuple[int, bytes]:
-        """Return what is kept after a position, and where it begins.
+        """Return the kept output after a position, and where it begins.
 
         Args:
             position: The position; all is returned after one that is not of this output.
@@ -117,17 +108,12 @@ class Newest:
         return begin, bytes(self.data[len(self.data) - (self.end - begin) :])
 
 
-class Relay:
-    """Copies all sources, and handles requests.
-
-    Args:
-        requests: Socket to the launch.
-        tag: Tag of the nodes, which end when the launch is killed.
-    """
+class OutputRelay:
+    """Copies all sources, and handles requests."""
 
     def __init__(self, requests: socket.socket, tag: str) -> None:
         self.requests = requests
-        self.tag = tag
+        self.tag = tag  # of the nodes, which end when the launch is killed
         self.children: dict[int, tuple[int, int]] = {}
         self.selector = selectors.DefaultSelector()
         self.selector.register(requests, selectors.EVENT_READ, None)
@@ -147,19 +133,16 @@ class Relay:
                     self._receive()
                 elif key.fd in self.sources:
                     self._read(key.data)
-            self._show_partial()
+            now = time.monotonic()
+            for source in self.sources.values():
+                if source.since and source.since + PARTIAL_SECONDS <= now:
+                    self._show(source, source.rest())
 
     def _timeout(self) -> float | None:
         waiting = [source.since for source in self.sources.values() if source.since]
         if not waiting:
             return None
         return max(0.0, min(waiting) + PARTIAL_SECONDS - time.monotonic())
-
-    def _show_partial(self) -> None:
-        now = time.monotonic()
-        for source in self.sources.values():
-            if source.since and source.since + PARTIAL_SECONDS <= now:
-                self._show(source, source.rest())
 
     def _receive(self) -> None:
         try:
@@ -214,7 +197,6 @@ class Relay:
             self._detach()
 
     def _forget(self, owner: int) -> None:
-        """Forget a child, which has ended."""
         if owner in self.children:
             os.close(self.children.pop(owner)[1])
 
@@ -222,14 +204,15 @@ class Relay:
         for source in [s for s in self.sources.values() if s.owner == owner]:
             self._read_all(source)
             self._show(source, source.rest())
-        tail = list(self.tails.get(owner, ()))
-        with contextlib.suppress(OSError):  # the launch has ended and needs no reply
-            self.requests.sendall(json.dumps({"id": owner, "tail": tail}).encode() + b"\n")
+        self._reply({"id": owner, "tail": list(self.tails.get(owner, ()))})
 
     def _answer(self, request: dict[str, Any]) -> None:
         newest = self.newest.get(request["id"])
         begin, data = (0, b"") if newest is None else newest.after(request["after"])
-        reply = {"read": request["number"], "begin": begin, "data": base64.b64encode(data).decode()}
+        text = base64.b64encode(data).decode()
+        self._reply({"read": request["number"], "begin": begin, "data": text})
+
+    def _reply(self, reply: dict[str, Any]) -> None:
         with contextlib.suppress(OSError):  # the launch has ended and needs no reply
             self.requests.sendall(json.dumps(reply).encode() + b"\n")
 
@@ -289,7 +272,7 @@ def main() -> None:
     requests = socket.socket(fileno=int(sys.argv[1]))
     with contextlib.suppress(OSError):  # the launch has ended already
         requests.sendall(b"{}\n")
-    Relay(requests, sys.argv[2]).run()
+    OutputRelay(requests, sys.argv[2]).run()
 
 
 if __name__ == "__main__":

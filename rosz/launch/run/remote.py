@@ -12,98 +12,23 @@ import msgspec
 
 from rosz.errors import LaunchError
 from rosz.launch.plan import MachinePlan
+from rosz.launch.run import protocol
 from rosz.launch.run.console import Console
 from rosz.launch.run.excerpt import Excerpt, Position
-from rosz.launch.run.host import OnExit, OnRead, OnStart, ProcessSpec
+from rosz.launch.run.host import OnRead, OnReport
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.machines import ssh_command, ssh_failure
 from rosz.launch.run.process_tree import Usage
-from rosz.launch.run.protocol import (
-    PROTOCOL,
-    AgentVersion,
-    AgentWarning,
-    Exited,
-    Gone,
-    LineReader,
-    Measure,
-    Measured,
-    MessageWriter,
-    OutputRead,
-    Ping,
-    ReadOutput,
-    Ready,
-    Refused,
-    Report,
-    Setup,
-    Shown,
-    Signal,
-    Start,
-    Started,
-    rosz_version,
-)
-
-__all__ = ("Machines", "RemoteChild", "RemoteHost")
+from rosz.launch.run.protocol import AgentSetup, LineReader, MessageWriter, rosz_version
 
 _PINGS = 4
 _KEPT_LINES = 40
 _CLOSE_TIMEOUT = 5.0
-
-
-class RemoteChild:
-    """A process of another machine.
-
-    Args:
-        host: The machine.
-        serial: Number of the process in messages.
-        on_exit: Called once when it has ended.
-        on_start: Called once when it has been started, or refused.
-    """
-
-    def __init__(
-        self, host: RemoteHost, serial: int, on_exit: OnExit, on_start: OnStart | None
-    ) -> None:
-        self.pid = 0
-        self.shown = ""
-        self.logs = ""
-        self.place = host.place
-        self.pending = True
-        self.gone = False
-        self._on_exit: OnExit | None = on_exit
-        self._on_start = on_start
-        self._host = host
-        self._serial = serial
-
-    def signal(self, number: int) -> None:
-        """Send a signal to it and its descendants."""
-        self._host.send(Signal(self._serial, number))
-
-    def remains(self) -> bool:
-        """Return whether it or a descendant still runs."""
-        return not self.gone
-
-    def started(self, error: LaunchError | None) -> None:
-        """Report that it has been started, or why not."""
-        self.pending = False
-        on_start, self._on_start = self._on_start, None
-        if on_start is not None:
-            on_start(error)
-
-    def exited(self, code: int | None, tail: tuple[str, ...]) -> None:
-        """Report that it has ended, or that its machine is lost, for which ``code`` is None."""
-        on_exit, self._on_exit = self._on_exit, None
-        if on_exit is not None:
-            on_exit(code, tail)
+_DECODER = msgspec.json.Decoder(protocol.Report)
 
 
 class RemoteHost:
     """A machine reached by ssh.
-
-    Args:
-        machine: The machine.
-        name: Name of the connection in messages.
-        loop: Loop that waits for its messages.
-        console: Output for its nodes and for reports.
-        setup: Settings for its agent.
 
     Attributes:
         place: Address.
@@ -112,7 +37,7 @@ class RemoteHost:
     """
 
     def __init__(
-        self, machine: MachinePlan, name: str, loop: Loop, console: Console, setup: Setup
+        self, machine: MachinePlan, name: str, loop: Loop, console: Console, setup: AgentSetup
     ) -> None:
         self.place = machine.address
         self.error = ""
@@ -123,17 +48,18 @@ class RemoteHost:
         self._console = console
         self._silence = setup.silence
         self._serials = itertools.count(1)
-        self._children: dict[int, RemoteChild] = {}
+        self._pending: set[int] = set()  # processes that its agent has not started yet
+        self._running: set[int] = set()
+        self.report: OnReport = lambda _: None
         self._measuring: list[Callable[[dict[int, Usage]], None]] = []
         self._reading: dict[int, tuple[OnRead, Position | None]] = {}
         self._errors: list[str] = []
         self._connected = False
         self._closing = False
-        self._decoder = msgspec.json.Decoder(Report)
         # Output may be cut anywhere, even within a character.
         utf8 = codecs.getincrementaldecoder("utf-8")
         self._texts = {sink: utf8("replace") for sink in (1, 2)}
-        self._ssh = self._run_ssh()
+        self._ssh = _run_ssh(machine, name, setup.silence, console)
         assert self._ssh.stdin is not None  # noqa: S101  # all three are pipes
         assert self._ssh.stdout is not None  # noqa: S101
         assert self._ssh.stderr is not None  # noqa: S101
@@ -144,40 +70,19 @@ class RemoteHost:
         loop.watch(self._out.fd, self._read_reports)
         loop.watch(self._err.fd, self._read_errors)
         loop.watch_exit(self._ssh.pid, self._ssh_ended)
-        self.send(setup)
-        self._timeout = loop.later(machine.timeout, self._timed_out)
+        self._request(setup)
+        silent = f"'{self.place}' does not answer within {machine.timeout:g} s"
+        self._timeout = loop.later(machine.timeout, lambda: self._fail(silent))
         self._ping()
 
-    def _run_ssh(self) -> subprocess.Popen[bytes]:
-        machine = self._machine
-        user = f", user[{machine.user}]" if machine.user else ""
-        where = f"{self.place}:{machine.ssh_port}{user}"
-        self._console.say(f"remote[{self._name}]: creating ssh connection to {where}")
-        command = ssh_command(machine, self._silence)
-        self._console.note(f"remote[{self._name}]: {' '.join(command)}")
-        try:
-            return subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                start_new_session=True,
-            )
-        except FileNotFoundError as error:
-            raise LaunchError(
-                f"{machine.place}: machine '{machine.name}' needs ssh, which is not installed"
-            ) from error
-        except OSError as error:
-            raise LaunchError(f"{machine.place}: cannot run ssh: {error.strerror}") from error
-
-    def start(self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart) -> RemoteChild:
-        """Start a process; see `Host.start` for the arguments and errors."""
-        if self.error:
-            raise LaunchError(self.error)
-        serial = next(self._serials)
-        child = self._children[serial] = RemoteChild(self, serial, on_exit, on_start)
-        self.send(Start(serial, spec))
-        return child
+    def send(self, request: protocol.ProcessRequest) -> None:
+        """Start a process, or signal one; see `Host.send`."""
+        if isinstance(request, protocol.Start):
+            if self.error:
+                self.report(protocol.Refused(request.serial, self.error))
+                return
+            self._pending.add(request.serial)
+        self._request(request)
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
         """Call a function with the resources of its processes, which are none if it is lost."""
@@ -185,7 +90,7 @@ class RemoteHost:
             done({})
             return
         self._measuring.append(done)
-        self.send(Measure())
+        self._request(protocol.Measure())
 
     def read_output(self, owner: int, after: Position | None, done: OnRead) -> None:
         """Call a function with the newest output of a process, which is none if it is lost."""
@@ -194,20 +99,17 @@ class RemoteHost:
             return
         number = next(self._serials)
         self._reading[number] = (done, after)
-        self.send(ReadOutput(number, owner, after))
+        self._request(protocol.ReadOutput(number, owner, after))
 
-    def send(self, message: msgspec.Struct) -> None:
+    def _request(self, message: msgspec.Struct) -> None:
         """Send a request to the agent; it is dropped if the machine is lost."""
         if not self.error:
             self._writer.send(message)
 
     def _ping(self) -> None:
         if not self.error and not self._closing:
-            self.send(Ping())
+            self._request(protocol.Ping())
             self._loop.later(self._silence / _PINGS, self._ping)
-
-    def _timed_out(self) -> None:
-        self._fail(f"'{self.place}' does not answer within {self._machine.timeout:g} s")
 
     def _read_reports(self) -> None:
         for line in self._out.read():
@@ -240,41 +142,41 @@ class RemoteHost:
 
     def _handle(self, line: bytes) -> None:
         try:
-            report = self._decoder.decode(line)
+            report = _DECODER.decode(line)
         except msgspec.MsgspecError:
             if self._connected:
                 self._fail(f"'{self.place}' sent a message that is not valid: {line[:80]!r}")
             else:  # text of a login, which may explain why there will be no agent
                 self._keep_line(line)
             return
-        if isinstance(report, AgentVersion):
+        if isinstance(report, protocol.AgentVersion):
             self._check_version(report)
-        elif isinstance(report, Ready):
+        elif isinstance(report, protocol.Ready):
             self._set_ready(report)
-        elif isinstance(report, AgentWarning):
+        elif isinstance(report, protocol.AgentWarning):
             self._console.error(f"remote[{self._name}]: {report.text}")
-        elif isinstance(report, Shown):
+        elif isinstance(report, protocol.Shown):
             self._console.show(report.sink, self._texts[report.sink].decode(report.data))
-        elif isinstance(report, Measured):
+        elif isinstance(report, protocol.Measured):
             self._report_usage(report.used)
-        elif isinstance(report, OutputRead):
+        elif isinstance(report, protocol.OutputRead):
             if report.number in self._reading:
                 self._reading.pop(report.number)[0](report.excerpt)
         else:
-            self._update(report)
+            self._pass_on(report)
 
     def _report_usage(self, used: dict[int, Usage]) -> None:
         waiting, self._measuring = self._measuring, []
         for done in waiting:
             done(used)
 
-    def _check_version(self, agent: AgentVersion) -> None:
+    def _check_version(self, agent: protocol.AgentVersion) -> None:
         here = rosz_version()
-        if agent.protocol != PROTOCOL:
+        if agent.protocol != protocol.PROTOCOL:
             self._fail(
                 f"rosz {agent.version} on '{self.place}' does not work with rosz {here} here: its"
-                f" agent speaks protocol {agent.protocol}, expected {PROTOCOL}; install the same"
-                " version on both"
+                f" agent speaks protocol {agent.protocol}, expected {protocol.PROTOCOL}; install"
+                " the same version on both"
             )
             return
         self._connected = True
@@ -283,7 +185,7 @@ class RemoteHost:
                 f"WARNING: remote[{self._name}]: rosz {agent.version} there, {here} here"
             )
 
-    def _set_ready(self, ready: Ready) -> None:
+    def _set_ready(self, ready: protocol.Ready) -> None:
         self._timeout.cancel()
         self.ready = True
         self._console.say(f"remote[{self._name}]: ssh connection created")
@@ -295,20 +197,15 @@ class RemoteHost:
                 " core --listen tcp/0.0.0.0:7447' here, or set ROSZ_CONNECT there"
             )
 
-    def _update(self, report: Started | Refused | Exited | Gone) -> None:
-        child = self._children.get(report.serial)
-        if child is None:
-            return
-        if isinstance(report, Started):
-            child.pid, child.shown, child.logs = report.pid, report.shown, report.logs
-            child.started(None)
-        elif isinstance(report, Exited):
-            child.exited(report.code, report.tail)
-        else:
-            child.gone = True
-            del self._children[report.serial]
-            if isinstance(report, Refused):
-                child.started(LaunchError(f"on '{self.place}': {report.text}"))
+    def _pass_on(self, report: protocol.ProcessReport) -> None:
+        self._pending.discard(report.serial)
+        if isinstance(report, protocol.Started):
+            self._running.add(report.serial)
+        elif isinstance(report, protocol.Refused):
+            report = protocol.Refused(report.serial, f"on '{self.place}': {report.text}")
+        elif isinstance(report, protocol.Gone):
+            self._running.discard(report.serial)
+        self.report(report)
 
     def _ssh_ended(self) -> None:
         code = self._ssh.wait()
@@ -337,13 +234,13 @@ class RemoteHost:
         reading, self._reading = self._reading, {}
         for done, after in reading.values():
             done(Excerpt("", after or (0, 0)))
-        children, self._children = self._children, {}
-        for child in children.values():
-            child.gone = True
-            if child.pending:
-                child.started(LaunchError(self.error))
-            else:
-                child.exited(None, (self.error,))
+        pending, self._pending = self._pending, set()
+        running, self._running = self._running, set()
+        for serial in sorted(pending):
+            self.report(protocol.Refused(serial, self.error))
+        for serial in sorted(running):
+            self.report(protocol.Exited(serial, None, (self.error,)))
+            self.report(protocol.Gone(serial))
 
     def disconnect(self) -> None:
         """Let the agent end with all that it runs, without waiting for it."""
@@ -369,25 +266,38 @@ class RemoteHost:
                 stream.close()
 
 
-class Machines:
-    """All other machines of one launch.
+def _run_ssh(
+    machine: MachinePlan, name: str, silence: float, console: Console
+) -> subprocess.Popen[bytes]:
+    user = f", user[{machine.user}]" if machine.user else ""
+    where = f"{machine.address}:{machine.ssh_port}{user}"
+    console.say(f"remote[{name}]: creating ssh connection to {where}")
+    command, pipe = ssh_command(machine, silence), subprocess.PIPE
+    console.note(f"remote[{name}]: {' '.join(command)}")
+    try:
+        return subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+        )
+    except FileNotFoundError as error:
+        raise LaunchError(
+            f"{machine.place}: machine '{machine.name}' needs ssh, which is not installed"
+        ) from error
+    except OSError as error:
+        raise LaunchError(f"{machine.place}: cannot run ssh: {error.strerror}") from error
 
-    Args:
-        loop: Loop that waits for their messages.
-        console: Output for their nodes and for reports.
-    """
+
+class Machines:
+    """All other machines of one launch."""
 
     def __init__(self, loop: Loop, console: Console) -> None:
         self._loop = loop
         self._console = console
         self._hosts: list[RemoteHost] = []
 
-    def connect(self, machines: Mapping[str, MachinePlan], setup: Setup) -> dict[str, RemoteHost]:
+    def connect(
+        self, machines: Mapping[str, MachinePlan], setup: AgentSetup
+    ) -> dict[str, RemoteHost]:
         """Start the agents of all machines, and wait until they are ready.
-
-        Args:
-            machines: The machines by name.
-            setup: Settings for the agents.
 
         Raises:
             LaunchError: If an agent does not start; the message gives the reason for each.
@@ -415,7 +325,7 @@ class Machines:
         return hosts
 
     def close(self) -> None:
-        """End all agents with what they run; a second call has no effect."""
+        """End all agents with their processes; a second call has no effect."""
         for host in self._hosts:
             host.disconnect()
         for host in self._hosts:

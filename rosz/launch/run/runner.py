@@ -23,16 +23,14 @@ from rosz.launch.run.host import Host, LocalHost, is_local
 from rosz.launch.run.loop import Loop, stopped_by_signals
 from rosz.launch.run.machines import MachineOption, launch_endpoints, move_machines
 from rosz.launch.run.network import RUN_ID, Network, core_params, launch_uri, set_params
-from rosz.launch.run.output import Output, RunFolder
+from rosz.launch.run.output import RelayedOutput, RunFolder
 from rosz.launch.run.process_tree import TAG, ProcessTree
-from rosz.launch.run.protocol import Setup
+from rosz.launch.run.protocol import AgentSetup, Timeouts
 from rosz.launch.run.remote import Machines
-from rosz.launch.run.supervisor import Process, Supervisor, Timeouts
+from rosz.launch.run.supervisor import LaunchProcess, Supervisor
 from rosz.lifecycle import Closable
 from rosz.session import Session
 from rosz.wire import entity_key
-
-__all__ = ("Options", "Runner", "apply_options", "describe_failures", "describe_plan")
 
 _RUN_ID_PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]{0,63}")
 _MAX_VALUE_WIDTH = 20
@@ -54,7 +52,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
         title: Whether the terminal's window is named after the launch.
         machines: Addresses of machines, in place of those in the files.
         silence: Time in seconds without a message from another machine after which it counts as
-            lost, and its agent ends what runs there.
+            lost, and its agent ends the processes there.
         timeouts: Time that processes have to end.
         stay: Whether the launch goes on when all processes have ended, since more may come.
     """
@@ -101,12 +99,6 @@ class Runner:
     """One launch.
 
     Args:
-        plan: The plan.
-        workplace: The packages and settings for commands.
-        network: The parameters and the graph.
-        options: The options.
-        out: Stream for normal messages.
-        err: Stream for errors.
         begun: Function called with the supervisor once the processes have been started.
 
     Raises:
@@ -159,12 +151,16 @@ class Runner:
             LaunchError: If the launch cannot run.
             ParamError: If a value is not a parameter value.
         """
-        output = Output(self._loop, self._console.error, self._tag)
+        output = RelayedOutput(self._loop, self._console.error, self._tag)
         try:
             supervisor = self._prepare(output)
             self._supervise(supervisor)
             output.close()
-            self._conclude(supervisor)
+            self._console.say("shutting down processing monitor...")
+            self._console.say("... shutting down processing monitor complete")
+            if supervisor.failures:
+                self._console.error(describe_failures(supervisor.failures))
+            self._console.strong("done")
         finally:
             self._machines.close()
             output.close()
@@ -172,8 +168,7 @@ class Runner:
             self._console.close()
         return 1 if supervisor.failed else 0
 
-    def _prepare(self, output: Output) -> Supervisor:
-        """Do everything that comes before the first process."""
+    def _prepare(self, output: RelayedOutput) -> Supervisor:
         console, network = self._console, self._network
         is_new_run = self._find_run()
         folder = self._make_folder()
@@ -200,12 +195,12 @@ class Runner:
     def _find_run(self) -> bool:
         """Set the id of the run, and return whether the run is new."""
         try:
-            found = self._network.get(RUN_ID)
+            run_id = self._network.get(RUN_ID)
         except ParamNotFound:
-            found = None
+            run_id = None
         # Checked, as anybody may have set it, and it becomes part of paths and keys.
-        if isinstance(found, str) and _RUN_ID_PATTERN.fullmatch(found):
-            self.run_id = found
+        if isinstance(run_id, str) and _RUN_ID_PATTERN.fullmatch(run_id):
+            self.run_id = run_id
             return False
         self.run_id = str(uuid.uuid1())
         return True
@@ -241,7 +236,7 @@ class Runner:
         Raises:
             LaunchError: If a machine cannot be used.
         """
-        setup = Setup(
+        setup = AgentSetup(
             run_id=self.run_id,
             tag=self._tag,
             domain=self._workplace.environment.domain,
@@ -323,23 +318,9 @@ class Runner:
         clock = session.subscriber(key, lambda _: self._loop.post(heard))
         return clock
 
-    def _conclude(self, supervisor: Supervisor) -> None:
-        console = self._console
-        console.say("shutting down processing monitor...")
-        console.say("... shutting down processing monitor complete")
-        text = describe_failures(supervisor.failures)
-        if text:
-            console.error(text)
-        console.strong("done")
-
 
 def describe_plan(plan: Plan, *, machines: bool = False) -> str:
-    """Return a summary of a plan as roslaunch prints it.
-
-    Args:
-        plan: The plan.
-        machines: Whether to list machines, as roslaunch does if some are not this one.
-    """
+    """Return a summary of a plan as roslaunch prints it, with its machines if wanted."""
     parts = ["\nSUMMARY\n========"]
     if plan.clear:
         cleared = sorted(f" * {name.rstrip('/')}/" for name in plan.clear)
@@ -372,11 +353,11 @@ def _shorten(value: Any) -> str:
     return "<...>"
 
 
-def describe_failures(processes: Iterable[Process]) -> str:
-    """Return which processes failed or died, why, and their last output; "" if none did."""
+def describe_failures(processes: Iterable[LaunchProcess]) -> str:
+    """Return which processes failed or died, why, and their last output."""
     parts = []
     for process in processes:
         lines = [f" * {process.node.full_name} [{process.label}] {process.describe_end()}"]
         lines += [f"     {line}" for line in process.tail]
         parts.append("\n".join(lines))
-    return "\n".join(["\nDIED", *parts]) if parts else ""
+    return "\n".join(["\nDIED", *parts])

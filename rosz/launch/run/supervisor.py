@@ -1,49 +1,43 @@
 """The processes of one launch: started in order, watched, restarted, ended together.
 
-A `Process` is one node from its waits to its end. The `Supervisor` owns all of them, reports what
-happens in roslaunch's words, and ends the launch when a required process has ended, or when all
-have ended and none is started again.
+A `LaunchProcess` is one node from its waits to its end. The `Supervisor` owns all of them, reports
+what happens in roslaunch's words, and ends the launch when a required process has ended, or when
+all have ended and none is started again.
 """
 
 from __future__ import annotations
 
+import itertools
 import signal
 from collections.abc import Callable, Sequence
 from enum import Enum
 from functools import partial
 
-import msgspec
-
 from rosz.errors import LaunchError, NotFoundError, RoszError, near_miss
 from rosz.launch.plan import Condition, NodePlan, Wait
 from rosz.launch.run.console import Console
-from rosz.launch.run.host import Child, Host, ProcessSpec
-from rosz.launch.run.loop import Loop, Timer
-
-__all__ = ("Process", "State", "Supervisor", "Timeouts", "describe_exit")
+from rosz.launch.run.host import Host
+from rosz.launch.run.loop import Loop, LoopTimer
+from rosz.launch.run.protocol import (
+    Exited,
+    ProcessReport,
+    ProcessSpec,
+    Refused,
+    Signal,
+    Start,
+    Started,
+    Timeouts,
+)
 
 _MIN_RESPAWN = 0.1
 """Least time in seconds from an end to the next start, so that a broken node does not use a CPU."""
-_MIN_CHECK, _MAX_CHECK = 0.005, 0.1
 _CONDITION_INTERVAL = 0.05
 _AFTER_SIGKILL = 1.0
 """Time in seconds after which a process that SIGKILL did not end is given up."""
 _RULE = "=" * 80
 
 
-class Timeouts(msgspec.Struct, frozen=True):
-    """The time that processes have to end.
-
-    Attributes:
-        sigint: Time from SIGINT to SIGTERM in seconds.
-        sigterm: Time from SIGTERM to SIGKILL in seconds.
-    """
-
-    sigint: float = 15.0
-    sigterm: float = 2.0
-
-
-class State(Enum):
+class ProcessState(Enum):
     """The state of a process."""
 
     WAITING = "waiting"
@@ -54,24 +48,12 @@ class State(Enum):
     FAILED = "failed"
 
 
-class Process:
+class LaunchProcess:
     """One node, and the processes that run it one after the other.
 
-    Args:
-        node: The node from the plan.
-        number: Number of the node in the launch.
-        host: The machine that it runs on.
-        supervisor: The supervisor, which is notified of what happens.
-
     Attributes:
-        label: Name that messages show.
-        state: Current state.
-        child: The latest process, or None.
-        code: Exit code of the latest process, or None.
+        child: The latest process, once its machine has started it.
         lost: Whether the latest process is lost with its machine, so that nobody knows its end.
-        tail: Last lines of its output.
-        error: Reason why it could not be started, or "".
-        starts: Number of starts.
         began: Time of the latest start, by the loop's clock.
         ended: Time of the latest end, by the loop's clock.
         killed: Whether it did not end in time and was killed.
@@ -83,8 +65,8 @@ class Process:
         self.owner = number
         self.label = f"{node.full_name.strip('/')}-{number}"
         self.host = host
-        self.state = State.WAITING
-        self.child: Child | None = None
+        self.state = ProcessState.WAITING
+        self.child: Started | None = None
         self.code: int | None = None
         self.lost = False
         self.tail: tuple[str, ...] = ()
@@ -96,23 +78,19 @@ class Process:
         self.alive = False
         self._supervisor = supervisor
         self._loop = supervisor.loop
-        self._timeouts = supervisor.timeouts
-        self._timers: list[Timer] = []
+        self._timers: list[LoopTimer] = []
         self._again = False
-
-    @property
-    def place(self) -> str:
-        """Address of its machine, or "" for this one."""
-        return self.host.place
+        self._serial = 0
+        host.report = supervisor.handle
 
     @property
     def over(self) -> bool:
         """Whether nothing of it runs, and nothing will unless requested."""
-        return self.state in {State.ENDED, State.FAILED}
+        return self.state in {ProcessState.ENDED, ProcessState.FAILED}
 
     def begin(self) -> None:
         """Wait for the conditions of the node, then start it."""
-        self.state = State.WAITING
+        self.state = ProcessState.WAITING
         self._wait(self.node.wait_for)
 
     def _wait(self, waits: tuple[Wait, ...]) -> None:
@@ -126,12 +104,14 @@ class Process:
             if any(map(self._supervisor.holds, wait.any_of)):
                 self._wait(tuple(later))
             elif self._loop.now() >= deadline:
-                wanted = " or ".join(map(str, wait.any_of))
                 self._fail(LaunchError(f"{wait.place}: no {wanted} within {wait.timeout:g} s"))
             else:
                 self._after(_CONDITION_INTERVAL, check)
 
-        self._supervisor.waiting(self, wait)
+        wanted = " or ".join(map(str, wait.any_of))
+        self._supervisor.console.say(
+            f"[{self.label}] waiting for {wanted} (at most {wait.timeout:g} s)"
+        )
         check()
 
     def _after(self, seconds: float, action: Callable[[], None]) -> None:
@@ -143,88 +123,78 @@ class Process:
     def _start(self) -> None:
         self._cancel_timers()
         spec = ProcessSpec(self.node, self.owner, self.label, again=self.starts > 0)
-        which = self.starts + 1
-        try:
-            self.child = self.host.start(
-                spec, partial(self._exited, which), partial(self._confirmed, which)
-            )
-        except RoszError as error:
-            self._fail(error)
-            return
-        self.state = State.RUNNING
+        self.child = None
+        self.state = ProcessState.RUNNING
         self.alive = True
         self._again = False
         self.code = None
         self.lost = False
         self.tail = ()
-        self.starts = which
+        self.starts += 1
         self.began = self._loop.now()
-        if not self.child.pending:
-            self._supervisor.started(self)
+        self._serial = self._supervisor.register(self)
+        self.host.send(Start(self._serial, spec))
 
-    def _is_outdated(self, which: int) -> bool:
-        """Return whether a report is about a process that has been given up or replaced."""
-        return self.over or which != self.starts
-
-    def _confirmed(self, which: int, error: RoszError | None) -> None:
-        """Handle the answer of another machine to a start."""
-        if self._is_outdated(which):
-            return
-        if error is None:
+    def handle(self, report: ProcessReport) -> None:
+        """Handle a report about the latest process."""
+        if isinstance(report, Started):
+            self.child = report
             self._supervisor.started(self)
-            return
-        self.alive = False
-        self._fail(error)
+        elif isinstance(report, Refused):
+            self.alive = False
+            self._fail(LaunchError(report.text))
+        elif not isinstance(report, Exited):
+            self._gone()
+        elif self.alive:
+            self._exited(report)
 
     def _fail(self, error: RoszError) -> None:
         self._cancel_timers()
-        self.state = State.FAILED
+        self._supervisor.forget(self._serial)
+        self.state = ProcessState.FAILED
         self.error = str(error)
         self._supervisor.failed_to_start(self, error)
         self._supervisor.finished(self)
 
-    def _exited(self, which: int, code: int | None, tail: tuple[str, ...]) -> None:
-        if self._is_outdated(which):
-            return
-        requested = self.state is State.STOPPING
-        self.code = code
-        self.lost = code is None
-        self.tail = tail
+    def _exited(self, report: Exited) -> None:
+        requested = self.state is ProcessState.STOPPING
+        self.code = report.code
+        self.lost = report.code is None
+        self.tail = report.tail
         self.ended = self._loop.now()
         self.alive = False
-        self.state = State.STOPPING
+        self.state = ProcessState.STOPPING
         if not requested:
             limit = self.node.respawn_max
             self._again = self.node.respawn and (limit is None or self.starts <= limit)
             self._supervisor.died(self)
-            self._escalate((signal.SIGTERM, 0.0), (signal.SIGKILL, self._timeouts.sigterm))
-        self._check_gone(_MIN_CHECK)
+            sigterm = self._supervisor.timeouts.sigterm
+            self._escalate((signal.SIGTERM, 0.0), (signal.SIGKILL, sigterm))
 
     def stop(self) -> None:
         """End it with SIGINT, then with stronger signals if that does not help."""
         self._again = False
-        if self.state is State.RUNNING:
-            self.state = State.STOPPING
+        if self.state is ProcessState.RUNNING:
+            self.state = ProcessState.STOPPING
+            limits = self._supervisor.timeouts
             self._escalate(
                 (signal.SIGINT, 0.0),
-                (signal.SIGTERM, self._timeouts.sigint),
-                (signal.SIGKILL, self._timeouts.sigint + self._timeouts.sigterm),
+                (signal.SIGTERM, limits.sigint),
+                (signal.SIGKILL, limits.sigint + limits.sigterm),
             )
-        elif self.state in {State.WAITING, State.RESPAWNING}:
+        elif self.state in {ProcessState.WAITING, ProcessState.RESPAWNING}:
             self._finish()
 
     def kill(self) -> None:
         """End it with SIGKILL."""
         self.stop()
-        if self.child is not None and not self.over:
+        if not self.over:
             self._cancel_timers()
             self._escalate((signal.SIGKILL, 0.0))
-            if not self.alive:
-                self._check_gone(_MIN_CHECK)
 
     def restart(self) -> None:
         """End it if it runs, and start it again, even if the plan does not respawn it."""
-        if self.over or self.state in {State.WAITING, State.RESPAWNING}:
+        if self.over or self.state in {ProcessState.WAITING, ProcessState.RESPAWNING}:
             self._start()
         else:
             self.stop()
@@ -238,20 +208,10 @@ class Process:
             self._timers.append(self._loop.later(last, self._give_up))
 
     def _send(self, number: signal.Signals, *, first: bool) -> None:
-        if self.child is None or not self.child.remains():
-            return
         if not first:
             self.killed = number is signal.SIGKILL
             self._supervisor.escalating(self, number)
-        self.child.signal(number)
-
-    def _check_gone(self, interval: float) -> None:
-        """Continue once the process and all descendants have ended."""
-        if self.child is None or not self.child.remains():
-            self._gone()
-        else:
-            longer = min(2 * interval, _MAX_CHECK)
-            self._timers.append(self._loop.later(interval, lambda: self._check_gone(longer)))
+        self.host.send(Signal(self._serial, number))
 
     def _give_up(self) -> None:
         """Stop waiting for a process that SIGKILL does not end, such as one stuck in a driver."""
@@ -261,21 +221,22 @@ class Process:
 
     def _gone(self) -> None:
         self._cancel_timers()
+        self._supervisor.forget(self._serial)
         if not self._again:
             self._finish()
             return
-        self.state = State.RESPAWNING
+        self.state = ProcessState.RESPAWNING
         due = self.ended + max(self.node.respawn_delay, _MIN_RESPAWN)
 
         def respawn() -> None:
-            self._supervisor.respawning(self)
+            self._supervisor.console.say(f"[{self.label}] restarting process")
             self._start()
 
         self._after(due - self._loop.now(), respawn)
 
     def _finish(self) -> None:
         self._cancel_timers()
-        self.state = State.ENDED
+        self.state = ProcessState.ENDED
         self._supervisor.finished(self)
 
     def _cancel_timers(self) -> None:
@@ -285,7 +246,7 @@ class Process:
 
     def describe_end(self) -> str:
         """Return how it ended, in words."""
-        if self.state is State.FAILED:
+        if self.state is ProcessState.FAILED:
             return f"could not be started: {self.error}"
         text = describe_exit(self.code, lost=self.lost)
         if self.killed:
@@ -296,12 +257,7 @@ class Process:
 
 
 def describe_exit(code: int | None, *, lost: bool = False) -> str:
-    """Return the meaning of an exit code in words.
-
-    Args:
-        code: The exit code, or None if there is none.
-        lost: Whether the process is lost with its machine.
-    """
+    """Return the meaning of an exit code in words, also of that of a process that is lost."""
     if lost:
         return "is lost with its machine"
     if code is None:
@@ -318,11 +274,8 @@ class Supervisor:
     """The processes of a launch.
 
     Args:
-        nodes: The nodes to run, in order.
         host_of: Function that returns the machine of a node; it may raise `LaunchError`.
         loop: Loop that waits; it is stopped when the launch is over.
-        console: Output for reports.
-        timeouts: Time that processes have to end.
         holds: Function that returns whether a condition of ``wait_for`` is true.
         stay: Whether the launch continues when nothing runs any more.
 
@@ -348,16 +301,18 @@ class Supervisor:
         self.timeouts = timeouts
         self.holds = holds
         self._stay = stay
-        self._console = console
+        self.console = console
         self.closing = False
         self._begun = False
         self._callbacks: dict[int, list[Callable[[], None]]] = {}
         self._host_of = host_of
-        self._deaths: list[Callable[[Process], None]] = []
+        self._serials = itertools.count(1)
+        self._running: dict[int, LaunchProcess] = {}
+        self._deaths: list[Callable[[LaunchProcess], None]] = []
         self.failed = False
-        self.failures: list[Process] = []
+        self.failures: list[LaunchProcess] = []
         self.processes = [
-            Process(node, number, host_of(node), self) for number, node in enumerate(nodes, 1)
+            LaunchProcess(node, number, host_of(node), self) for number, node in enumerate(nodes, 1)
         ]
 
     @property
@@ -373,45 +328,45 @@ class Supervisor:
         self._begun = True
         self._end_when_over()
 
-    def add(self, node: NodePlan) -> Process:
+    def add(self, node: NodePlan) -> LaunchProcess:
         """Start a further process, and return it; only on the loop's thread."""
         number = len(self.processes) + 1
-        process = Process(node, number, self._host_of(node), self)
+        process = LaunchProcess(node, number, self._host_of(node), self)
         self.processes.append(process)
         process.begin()
         return process
 
-    def on_death(self, callback: Callable[[Process], None]) -> None:
+    def on_death(self, callback: Callable[[LaunchProcess], None]) -> None:
         """Call a function with each process that ends by itself, on the loop's thread."""
         self._deaths.append(callback)
 
-    def find(self, name: str) -> Process:
+    def find(self, name: str) -> LaunchProcess:
         """Return the process of a node.
 
         Raises:
             NotFoundError: If this launch has no such node.
         """
-        known = {process.node.full_name: process for process in self.processes}
-        found = known.get(f"/{name.strip('/')}")
-        if found is None:
-            listing = f"; it has {', '.join(known)}" if known else ""
+        by_name = {process.node.full_name: process for process in self.processes}
+        named = by_name.get(f"/{name.strip('/')}")
+        if named is None:
+            listing = f"; it has {', '.join(by_name)}" if by_name else ""
             raise NotFoundError(
-                f"this launch has no node '{name}'{near_miss(name, known) or listing}"
+                f"this launch has no node '{name}'{near_miss(name, by_name) or listing}"
             )
-        return found
+        return named
 
-    def stop(self, process: Process, done: Callable[[], None]) -> None:
+    def stop(self, process: LaunchProcess, done: Callable[[], None]) -> None:
         """End one process for good, then call a function."""
-        self._console.say(f"[{process.label}] kill requested")
+        self.console.say(f"[{process.label}] kill requested")
         if process.over:
             done()
             return
         self._callbacks.setdefault(process.owner, []).append(done)
         process.stop()
 
-    def restart(self, process: Process, done: Callable[[], None]) -> None:
+    def restart(self, process: LaunchProcess, done: Callable[[], None]) -> None:
         """End one process if it runs, start it again, and call a function when it has started."""
-        self._console.say(f"[{process.label}] restart requested")
+        self.console.say(f"[{process.label}] restart requested")
         self._callbacks.setdefault(process.owner, []).append(done)
         process.restart()
 
@@ -421,8 +376,8 @@ class Supervisor:
             return
         self.closing = True
         for process in reversed(self.processes):
-            if process.state is State.RUNNING:
-                self._console.say(f"[{process.label}] killing on exit")
+            if process.state is ProcessState.RUNNING:
+                self.console.say(f"[{process.label}] killing on exit")
             process.stop()
         self._end_when_over()
 
@@ -433,37 +388,48 @@ class Supervisor:
             process.kill()
         self._end_when_over()
 
-    # Reports of processes.
+    # Reports of machines and processes.
 
-    def waiting(self, process: Process, wait: Wait) -> None:
-        """Report that a process waits before it starts."""
-        wanted = " or ".join(map(str, wait.any_of))
-        self._console.say(f"[{process.label}] waiting for {wanted} (at most {wait.timeout:g} s)")
+    def register(self, process: LaunchProcess) -> int:
+        """Return the number of a process that is about to start, for requests and reports."""
+        serial = next(self._serials)
+        self._running[serial] = process
+        return serial
 
-    def started(self, process: Process) -> None:
+    def forget(self, serial: int) -> None:
+        """Ignore further reports about a process that has ended or is given up."""
+        self._running.pop(serial, None)
+
+    def handle(self, report: ProcessReport) -> None:
+        """Handle a report of a machine."""
+        process = self._running.get(report.serial)
+        if process is not None:
+            process.handle(report)
+
+    def started(self, process: LaunchProcess) -> None:
         """Report that a process runs."""
         if process.child is not None:
-            where = f" on {process.place}" if process.place else ""
-            self._console.strong(
+            where = f" on {process.host.place}" if process.host.place else ""
+            self.console.strong(
                 f"process[{process.label}]: started with pid [{process.child.pid}]{where}"
             )
-            self._console.note(f"process[{process.label}]: {process.child.shown}")
+            self.console.note(f"process[{process.label}]: {process.child.shown}")
         self._call_back(process)
 
-    def failed_to_start(self, process: Process, error: RoszError) -> None:
+    def failed_to_start(self, process: LaunchProcess, error: RoszError) -> None:
         """Report that a process cannot be started."""
         node = process.node
         what = f"{node.package}/{node.type}" if node.package else node.full_name
         if node.members:
-            what = " + ".join(f"{one.package}/{one.type}" for one in node.members)
-        self._console.error(f"ERROR: cannot launch node of type [{what}]: {error}")
+            what = " + ".join(f"{member.package}/{member.type}" for member in node.members)
+        self.console.error(f"ERROR: cannot launch node of type [{what}]: {error}")
         self.failed = True
         self.failures.append(process)
         if node.required and not self.closing:
-            self._console.error(f"REQUIRED process [{process.label}] cannot be started\n")
+            self.console.error(f"REQUIRED process [{process.label}] cannot be started\n")
             self.shutdown()
 
-    def died(self, process: Process) -> None:
+    def died(self, process: LaunchProcess) -> None:
         """Report that a process ended by itself, and end the others if it was required."""
         for callback in self._deaths:
             callback(process)
@@ -471,27 +437,27 @@ class Supervisor:
         if process not in self.failures and (process.code != 0 or process.node.required):
             self.failures.append(process)
         if process.node.required:
-            self._console.error(
+            self.console.error(
                 f"{_RULE}REQUIRED process [{process.label}] has died!\n{text}\n"
                 f"Initiating shutdown!\n{_RULE}"
             )
             self.failed = self.failed or process.code != 0
             self.shutdown()
         elif process.code != 0:
-            self._console.error(f"[{process.label}] {text}")
+            self.console.error(f"[{process.label}] {text}")
         else:
-            self._console.strong(f"[{process.label}] {text}")
+            self.console.strong(f"[{process.label}] {text}")
 
     @staticmethod
-    def _describe_death(process: Process) -> str:
+    def _describe_death(process: LaunchProcess) -> str:
         child = process.child
         nodes = ", ".join(member.full_name for member in process.node.members)
         what = f"process of nodes {nodes}" if nodes else "process"
         text = f"{what} has finished cleanly"
         if process.lost and child is not None:
             text = (
-                f"{what} is lost with its machine [pid {child.pid} on {process.place}, exit code"
-                f" unknown, cmd {child.shown}]."
+                f"{what} is lost with its machine [pid {child.pid} on {process.host.place}, exit"
+                f" code unknown, cmd {child.shown}]."
             )
         elif process.code and child is not None:
             text = (
@@ -499,25 +465,21 @@ class Supervisor:
             )
         if child is None or not child.logs:
             return text
-        where = f"{process.place}:" if process.place else ""
+        where = f"{process.host.place}:" if process.host.place else ""
         return f"{text}\nlog file: {where}{child.logs}"
 
-    def respawning(self, process: Process) -> None:
-        """Report that a process starts again."""
-        self._console.say(f"[{process.label}] restarting process")
-
-    def escalating(self, process: Process, number: int) -> None:
+    def escalating(self, process: LaunchProcess, number: int) -> None:
         """Report that a process did not end in time and gets a stronger signal."""
-        self._console.error(f"[{process.label}] escalating to {signal.Signals(number).name}")
+        self.console.error(f"[{process.label}] escalating to {signal.Signals(number).name}")
         if process.killed and process not in self.failures:
             self.failures.append(process)
 
-    def finished(self, process: Process) -> None:
+    def finished(self, process: LaunchProcess) -> None:
         """Handle the final end of a process and its descendants."""
         self._call_back(process)
         self._end_when_over()
 
-    def _call_back(self, process: Process) -> None:
+    def _call_back(self, process: LaunchProcess) -> None:
         for done in self._callbacks.pop(process.owner, []):
             done()
 
@@ -527,6 +489,6 @@ class Supervisor:
         if not self.closing:
             if self._stay or not self._begun:
                 return
-            self._console.say("all processes on machine have died, rosz launch will exit")
+            self.console.say("all processes on machine have died, rosz launch will exit")
         self.closing = True
         self.loop.stop()

@@ -1,34 +1,52 @@
 """The replicated store on the network: one copy in each process, kept the same as all others.
 
-`replica` holds the copies themselves, `state` the history and tree of a copy, `broadcast` writes
-and their acknowledgements, `sync` joining, comparing and anti-entropy, `members` the replicas that
-are alive, `serve` what a replica does for programs that have none, and `watch` the notification of
-changes. The keys and messages are those of `rosz.params.wire`.
+`core` is all that a copy decides, in pure steps. `runner` runs it on threads, `exchange` sends and
+receives its messages, `tokens` shows it to others, `storage` is its file, and `watch` notifies of
+changes. `replica` puts the copies together, `reader` reads them, and `serve` holds the services for
+programs without a replica. `params` is the store as a node sees it, and `client` the store as seen
+by a process that has no replica. The keys and messages are those of `rosz.params.wire`.
 
-`PUBLIC_MODULES`: `storage` is imported by name, because only a replica with a file needs SQLite.
+The names are imported on first use: a command needs no replica, and few replicas need SQLite.
 """
 
-from rosz.params.replica.replica import (
-    ACK_TIMEOUT,
-    NO_REPLICA,
-    Follower,
-    Outcome,
-    Replica,
-    process_label,
-)
-from rosz.params.replica.state import not_found
-from rosz.params.replica.watch import Changed, Watch
+from __future__ import annotations
 
-PUBLIC_MODULES = ("storage",)
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False  # typing takes long to import
+if TYPE_CHECKING:
+    from rosz.params.replica.client import ParamClient
+    from rosz.params.replica.core.effects import Outcome
+    from rosz.params.replica.params import Params
+    from rosz.params.replica.replica import (
+        ACK_TIMEOUT,
+        Follower,
+        Replica,
+    )
+    from rosz.params.replica.storage import Storage, StoreFile
+    from rosz.params.replica.watch import Changed, Watch
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "client": "ParamClient",
+            "params": "Params",
+            "core.effects": "Outcome",
+            "replica": "ACK_TIMEOUT Follower Replica",
+            "storage": "Storage StoreFile",
+            "watch": "Changed Watch",
+        },
+    )
 
 __all__ = (
     "ACK_TIMEOUT",
-    "NO_REPLICA",
     "Changed",
     "Follower",
     "Outcome",
+    "ParamClient",
+    "Params",
     "Replica",
+    "Storage",
+    "StoreFile",
     "Watch",
-    "not_found",
-    "process_label",
 )

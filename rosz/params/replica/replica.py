@@ -1,8 +1,7 @@
 """Copies of the parameter store: the replica of a process, and followers.
 
-A replica first subscribes to the writes of others, then asks one of them for everything it has, and
-serves others once it has that. Reads are look-ups in its own tree. A write is applied here and
-broadcast to all others (`rosz.params.replica.broadcast`).
+What a copy decides is up to its core (`rosz.params.replica.core`), which `runner` runs and
+`exchange` connects with the others. Reads are look-ups in the copy's own tree.
 """
 
 from __future__ import annotations
@@ -14,34 +13,39 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import PurePath
-from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final
 
-import msgspec
-
-from rosz.errors import ClosedError, DecodeError, NoReplica, ParamError
-from rosz.lifecycle import Closable, Lifecycle
+from rosz.errors import NoReplica, ParamError, RoszError
+from rosz.lifecycle import Closing, Lifecycle
 from rosz.params.paths import Path, joined, to_path
-from rosz.params.replica.broadcast import WriteBroadcaster
-from rosz.params.replica.members import Core
+from rosz.params.replica.core import Config, ReplicaCore
+from rosz.params.replica.core.effects import Effect, Outcome, ReadStorages, SeedsChanged
+from rosz.params.replica.core.events import (
+    CloseCalled,
+    CompareCalled,
+    FollowCalled,
+    JoinCalled,
+    Loaded,
+    StoragesRead,
+    WriteCalled,
+)
+from rosz.params.replica.exchange import Exchange
+from rosz.params.replica.reader import TreeReader, not_found
+from rosz.params.replica.runner import CoreRunner
 from rosz.params.replica.serve import ClientServer, ParameterKeys
-from rosz.params.replica.state import NOT_A_PARAMETER, TreeReader, not_found
-from rosz.params.replica.sync import AntiEntropy, Synchroniser
-from rosz.params.replica.watch import TreeChange
+from rosz.params.replica.tokens import Tokens
 from rosz.params.tree import MISSING
 from rosz.params.values import normalise
-from rosz.params.wire import Member, Record, SyncReply, decode, encode
-from rosz.params.writes import DELETED, Change, Write
-from rosz.session import Sample, Session, Stamp, clamp_timeout
-from rosz.worker import Worker
+from rosz.params.wire import Departure, Keys, Record, ReplicaMember, SyncReply, decode, encode
+from rosz.params.writes import DELETED, Change
+from rosz.session import Session, Stamp, clamp_timeout
+from rosz.worker import lend_thread, start_thread
 
 if TYPE_CHECKING:
     from rosz.params.replica.storage import Storage
-
-__all__ = ("ACK_TIMEOUT", "NO_REPLICA", "Follower", "Outcome", "Replica", "process_label")
 
 _log = logging.getLogger("rosz.params")
 
@@ -53,38 +57,12 @@ NO_REPLICA: Final = (
     "'rosz core', 'rosz launch …' or any node that uses parameters"
 )
 
-_ELDERS: Final = 3
-"""Elders that there should be."""
-
-_CHANCE: Final = 0.02
-"""Chance that a replica becomes an elder in a second, if there is none; it grows each second."""
-
-_GROWTH: Final = 4
-_APPOINT_EVERY: Final = 10.0
-"""Seconds in which a replica that was appointed becomes an elder, and all others are told."""
-
-_ELDER: Final = "elder"
-_READER: Final = "reader"
-_WRITER: Final = "writer"
 _MESH_TIMEOUT: Final = 2.0
 _TOKENS_TIMEOUT: Final = 10.0
 """Seconds of the search for replicas; it takes milliseconds, or more while many start at once."""
 
-_COMPARE_EVERY: Final = 5.0
-_MAX_WAITING: Final = 2000
-"""Tasks of a worker above which requests from the network are refused."""
-
-
-class Outcome(msgspec.Struct, frozen=True):
-    """The result of a write.
-
-    Attributes:
-        time: Time of the write, in nanoseconds since the epoch.
-        slow: Replicas that did not acknowledge it in time, as shown to users.
-    """
-
-    time: int
-    slow: tuple[str, ...] = ()
+_TICK: Final = 1.0
+_RECONCILE_EVERY: Final = 30.0
 
 
 def process_label() -> str:
@@ -95,42 +73,29 @@ def process_label() -> str:
     return f"{program} (pid {os.getpid()} on {socket.gethostname()})"
 
 
-def _run(task: Callable[[], object]) -> None:
-    try:
-        task()
-    except ClosedError as error:
-        _log.debug("a task of the parameter store came too late: %s", error)
+class _Copy(TreeReader, Closing):
+    """A copy of the store: its core, and the messages that it exchanges with others."""
 
-
-class _Copy(TreeReader):
-    """A copy of the store: its state, the other replicas, and synchronisation with them.
-
-    Args:
-        session: Session of the copy; `close` leaves it open.
-        domain: ROS domain.
-    """
-
-    def __init__(self, session: Session, domain: int) -> None:
-        self._worker: Worker[Callable[[], object]] = Worker(
-            "rosz-params", _run, capacity=_MAX_WAITING, logger=_log
-        )
-        self._core = Core(session, domain, self._worker)
-        super().__init__(self._core.state)
-        self._keys = self._core.keys
-        self._members = self._core.members
-        self._sync = Synchroniser(self._core)
+    def __init__(
+        self, session: Session, domain: int, config: Config, storage: Storage | None = None
+    ) -> None:
+        self._runner = CoreRunner(ReplicaCore(config), session.clock, storage)
+        super().__init__(self._runner)
+        self._session = session
+        self._keys = Keys(domain, scoped=session.secured)
+        self._exchange = Exchange(session, self._keys, self._runner)
+        self._tokens = Tokens(session, self._keys, self._runner)
+        self._runner.carry_out = self._carry_out
 
     def close(self) -> None:
         """Leave the other copies; a second call has no effect."""
-        self._members.close()
-        self._worker.close()
-        self._state.watchers.close()
+        self._tokens.close()
+        self._exchange.close()
+        self._runner.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def _carry_out(self, effect: Effect) -> None:
+        self._exchange.carry_out(effect)
+        self._tokens.carry_out(effect)
 
 
 class Replica(_Copy):
@@ -146,7 +111,7 @@ class Replica(_Copy):
         settled: Event that is set when the session is linked to all its neighbours; without it, the
             constructor does not wait for that.
         storage: Storage that holds the parameters when the process has ended.
-        handover: What the replica that this one replaces had; see `frozen`.
+        handover: All writes of the replica that this one replaces; see `frozen`.
 
     Attributes:
         label: Process as shown to users.
@@ -167,44 +132,25 @@ class Replica(_Copy):
         storage: Storage | None = None,
         handover: bytes = b"",
     ) -> None:
-        super().__init__(session, domain)
         self.label: str = label or process_label()
         self.zid: str = session.zid
-        self._own = Member(session.stamp().time, session.zid, self.label)
+        member = ReplicaMember(session.stamp().time, session.zid, self.label)
+        scoped, stored = session.secured, storage is not None
+        config = Config(member, scoped, stored, seed=random.getrandbits(64))
+        super().__init__(session, domain, config, storage)
         self._lifecycle = Lifecycle("the parameter store of this process", log=_log)
         self._storage = storage
-        if self._restore(handover):
-            self._compact()
-        if storage is not None:
-            self._state.on_new(storage.save)
-        keys, sync = self._keys, self._sync
-        self._broadcaster = WriteBroadcaster(self._core, storage, sync.compare_soon)
-        self._parameter_keys = ParameterKeys(self._core)
-        sync.merge = self._merge
-        tell_key = keys.of(session.zid, "tell")
-        self._declared: list[Closable] = [
-            session.queryable(keys.of(session.zid, "sync"), sync.on_sync, complete=True),
-            session.queryable(f"{tell_key}/**", sync.on_writes, complete=True),
-            ClientServer(self._core, self.write, lambda: sync.ready),
-        ]
+        self._load(handover)
+        self._parameter_keys = ParameterKeys(session, self._keys, self._runner)
+        self._runner.on_own_change = self._parameter_keys.publish
+        self._exchange.serve()
+        self._server = ClientServer(session, self._keys, self._runner, self.write)
         if settled is not None:
             settled.wait(_MESH_TIMEOUT)
-        self._elder: Closable | None = None
-        self._chance = _CHANCE
-        self._appoint_at = 0.0
-        self._members.follow(self._on_elder, self._on_member, _TOKENS_TIMEOUT)
-        if keys.scoped or not self._members.elders():
-            self._members.follow_all(_ELDER, _TOKENS_TIMEOUT)
-        # Where rules may keep some replicas apart from others, all are elders.
-        elder = keys.scoped or not self._members.elders()
-        if not elder:
-            self._members.unfollow_all(_ELDER)
-        self._token = session.token(keys.token(self._own))
-        self._join()
-        if elder:
-            self._become_elder()
-        sync.on_appointed = self._become_elder
-        AntiEntropy(self._is_oldest, sync, self._parameter_keys, self._compact, self._check_elders)
+        self._tokens.follow_seeds(_TOKENS_TIMEOUT)
+        self._runner.call(lambda call, _: JoinCalled(call))
+        self._reconcile_at = time.monotonic()
+        self._runner.worker.later(_TICK, self._tick)
 
     def set(
         self, name: str | Path, value: object, *, origin: str = "", timeout: float = ACK_TIMEOUT
@@ -218,8 +164,8 @@ class Replica(_Copy):
             timeout: Time limit in seconds of the wait for the other replicas.
 
         Raises:
-            ParamError: A parameter cannot hold the value, the root would not be a dict, or a
-                replica refuses the write or cannot store it.
+            ParamError: A parameter cannot hold the value, or the root would not be a dict.
+            PartlyWritten: A replica refuses the write or cannot store it; it stands.
             InvalidName: The name is not a global name.
             ClosedError: The replica or the session is closed.
         """
@@ -233,8 +179,8 @@ class Replica(_Copy):
 
         Raises:
             ParamNotFound: The parameter is not set.
-            ParamError: The parameter is the root, or a replica refuses the write or cannot
-                store it.
+            ParamError: The parameter is the root.
+            PartlyWritten: A replica refuses the write or cannot store it; it stands.
             InvalidName: The name is not a global name.
             ClosedError: The replica or the session is closed.
         """
@@ -263,40 +209,31 @@ class Replica(_Copy):
             timeout: Time limit in seconds of the wait for the other replicas.
 
         Raises:
-            ParamError: The tree cannot hold a change, or a replica refuses the batch or cannot
-                store it; nothing is changed then.
+            ParamError: The tree cannot hold a change; nothing is changed then.
+            PartlyWritten: A replica refuses the batch or cannot store it; it stands.
             DecodeError: The given stamp lies years ahead; nothing is changed then.
             ClosedError: The replica or the session is closed.
             UsageError: The timeout is not a number; nothing is changed then.
         """
         timeout = clamp_timeout(timeout)
-        deadline = time.monotonic() + timeout
         if self._lifecycle.closing:
             self._lifecycle.check_open("write parameters")
         batch = list(changes)
         if not batch:
             return Outcome(0)
-        if timeout > 0:
-            self._members.follow_all(_WRITER, timeout)
-            timeout = max(0.0, deadline - time.monotonic())
         origin = origin or self.label
-        stamp, change = self._state.write(batch, origin, stamp)
-        slow, refusals = self._broadcaster.send(batch, stamp, origin, timeout)
-        unstored = self._wait_until_stored(deadline) if timeout > 0 else ""
-        if unstored is None:
-            slow = (*slow, f"the file of {self.label}")
-        elif unstored:
-            refusals[self.label] = unstored
-        if refusals:
-            self._undo(change, stamp, origin, deadline)
-            raise _refused(batch, refusals)
-        self._parameter_keys.publish(change)
-        return Outcome(stamp.time, slow)
+        given = None if stamp is None else (stamp.time, stamp.id)
+        outcome: Outcome = self._runner.call(
+            lambda call, now: WriteCalled(
+                call, batch, origin, given or (now.time, now.id), given is not None, timeout
+            )
+        )
+        return outcome
 
-    def members(self) -> list[Member]:
+    def members(self) -> list[ReplicaMember]:
         """Return the other replicas that are alive, oldest first, and follow all from now on."""
-        self._members.follow_all(_READER, _TOKENS_TIMEOUT)
-        return self._members.all()
+        self._runner.call(lambda call, _: FollowCalled(call, _TOKENS_TIMEOUT))
+        return self._runner.core.members()
 
     def compare(self, timeout: float) -> bool:
         """Compare with all other replicas and settle the differences.
@@ -308,26 +245,22 @@ class Replica(_Copy):
             Whether all of them replied in time.
         """
         timeout = clamp_timeout(timeout)
-        self._members.follow_all(_READER, timeout)
-        results: SimpleQueue[bool] = SimpleQueue()
-        expected = self._sync.compare_with_all(results.put)
-        try:
-            return all(results.get(timeout=timeout) for _ in range(expected))
-        except Empty:
-            return False
+        good: bool = self._runner.call(lambda call, _: CompareCalled(call, timeout))
+        return good
 
     def digest(self) -> bytes:
         """Return the digest of all writes; replicas with the same writes have the same digest."""
-        with self._state as history:
+        with self._runner as history:
             return history.digest()
 
     @contextmanager
     def frozen(self) -> Iterator[bytes]:
         """Return a context in which no write is taken or acknowledged here.
 
-        It gets all writes, for the replica that replaces this one.
+        It gets all writes, for the replica that replaces this one, which others wait for.
         """
-        with self._state.frozen() as history:
+        self._exchange.depart(Departure.RESTARTS)
+        with self._runner.frozen() as history:
             records = [Record.of(write) for write in history.writes()]
             yield encode(SyncReply(records=records, horizon=history.horizon))
 
@@ -341,137 +274,60 @@ class Replica(_Copy):
         self._lifecycle.close(self._leave)
 
     def _leave(self) -> None:
-        self._token.close()
-        if self._elder is not None:
-            self._elder.close()
-        for declared in self._declared:
-            declared.close()
-        self._broadcaster.close()
+        try:
+            self._runner.call(lambda call, _: CloseCalled(call))
+        except RoszError as error:  # below a signal handler that interrupted a write
+            _log.debug("nothing is handed over: %s", error)
+        self._exchange.depart(Departure.LEAVES)
+        self._server.close()
         super().close()
         self._parameter_keys.close()
         if self._storage is not None:
             self._storage.close()
 
     def __repr__(self) -> str:
-        state = "closed" if self.closed else f"{len(self._members.zids)} others"
-        return f"<Replica of {len(self._state)} writes, {state}>"
+        state = "closed" if self.closed else f"{len(self._runner.core.zids)} others"
+        return f"<Replica of {len(self._runner)} writes, {state}>"
 
-    def _join(self) -> None:
-        known = self._members.zids
-        if known:
-            self._sync.join()
-        else:
-            self._state.restore(self._parameter_keys.load())
-            self._sync.ready = True
-        for member in self._members.elders():
-            if member.zid not in known:
-                self._on_elder(member, True)
+    def _carry_out(self, effect: Effect) -> None:
+        match effect:
+            case ReadStorages():
+                if not lend_thread(self._read_storages):
+                    self._read_storages()
+            case SeedsChanged():
+                self._runner.worker.submit(self._serve_parameter_keys)
+            case _:
+                super()._carry_out(effect)
 
-    def _on_elder(self, member: Member, alive: bool) -> None:
-        self._worker.submit(self._serve_parameter_keys)
-        if alive and self._sync.ready:
-            self._sync.compare_soon(member.zid)
+    def _load(self, handover: bytes) -> None:
+        """Load the writes of before."""
+        if handover:
+            reply = decode(handover, SyncReply)
+            writes = [record.write() for record in reply.records]
+            self._runner.run(Loaded(writes, reply.horizon, changed=True))
+        elif self._storage is not None:
+            self._runner.run(Loaded(*self._storage.load()))
 
-    def _on_member(self, member: Member, alive: bool) -> None:
-        if not alive:
-            self._broadcaster.drop_peer(member.zid)
-            self._sync.drop_peer(member.zid)
-        elif self._sync.ready and member < self._own:
-            self._sync.compare_soon(member.zid)
-
-    def _check_elders(self) -> None:
-        """Be an elder if there is none, and none any more if there are too many; appoint others."""
-        elders = self._members.elders()
-        if self._elder is not None:
-            if not self._keys.scoped and sum(one < self._own for one in elders) >= _ELDERS:
-                self._elder.close()
-                self._elder = None
-                self._members.unfollow_all(_ELDER)
-            elif len(elders) < _ELDERS - 1 and self._is_oldest():
-                self._appoint_elders(_ELDERS - 1 - len(elders))
-        elif elders:
-            self._chance = _CHANCE
-        elif random.random() < self._chance:  # noqa: S311  # not for security
-            self._become_elder()
-        else:
-            self._chance *= _GROWTH
-
-    def _appoint_elders(self, count: int) -> None:
-        """Let others become elders, who all see that there are too few, and not who else does."""
-        now = time.monotonic()
-        known = {one.zid for one in self._members.elders()} | self._core.session.out_of_reach()
-        others = sorted(self._members.zids - known)
-        if now >= self._appoint_at and others:
-            self._appoint_at = now + _APPOINT_EVERY
-            for zid in random.sample(others, min(count, len(others))):
-                self._sync.appoint(zid)
-
-    def _become_elder(self) -> None:
-        if self._elder is not None:
-            return
-        self._members.follow_all(_ELDER)
-        self._elder = self._core.session.token(self._keys.elder_token(self._own))
-        if self._lifecycle.closing:  # perhaps too late for the thread that closes the replica
-            self._elder.close()
-        self._serve_parameter_keys()
+    def _read_storages(self) -> None:
+        self._runner.run(StoragesRead(self._parameter_keys.load()))
 
     def _serve_parameter_keys(self) -> None:
         # Rules may keep replies of replicas on other machines away from this one.
-        self._parameter_keys.serve(lambda: self._keys.scoped or self._is_oldest())
+        core = self._runner.core
+        self._parameter_keys.serve(lambda: self._keys.scoped or core.is_oldest_seed)
 
-    def _is_oldest(self) -> bool:
-        return self._elder is not None and all(
-            self._own < elder for elder in self._members.elders()
-        )
-
-    def _restore(self, handover: bytes) -> bool:
-        """Restore what is handed over or stored; return whether the storage differs from it."""
-        if handover:
-            reply = decode(handover, SyncReply)
-            self._state.restore([record.write() for record in reply.records], reply.horizon)
-            return True
-        return self._storage is not None and self._state.restore(*self._storage.load())
-
-    def _merge(self, writes: list[Write], horizon: int) -> None:
-        self._state.merge(writes, horizon)
-        self._compact()
-
-    def _snapshot(self) -> tuple[list[Write], int]:
-        with self._state as history:
-            return list(history.writes()), history.horizon
-
-    def _compact(self) -> None:
-        if self._storage is not None:
-            self._storage.compact(self._snapshot)
-
-    def _wait_until_stored(self, deadline: float) -> str | None:
-        """Return the reason why what was written cannot be stored; ``None`` if that takes long."""
-        if self._storage is None:
-            return ""
-        reasons: SimpleQueue[str] = SimpleQueue()
-        self._storage.when_stored(reasons.put)
-        try:
-            return reasons.get(timeout=max(0.0, deadline - time.monotonic()))
-        except Empty:
-            return None
-
-    def _undo(self, change: TreeChange, stamp: Stamp, origin: str, deadline: float) -> None:
-        """Undo a batch that a replica has refused, on all replicas that have taken it."""
-        changes, now, undone = self._state.undo(change, stamp, origin)
-        if changes:
-            timeout = max(0.0, deadline - time.monotonic())
-            self._broadcaster.send(changes, now, origin, timeout)
-            self._parameter_keys.publish(undone)
-
-
-def _ignore(_member: Member, _alive: bool) -> None: ...
-
-
-def _refused(batch: list[Change], refusals: Mapping[str, str]) -> ParamError:
-    name = joined(batch[0][0])
-    more = f" and {len(batch) - 1} more" if len(batch) > 1 else ""
-    reasons = "; ".join(f"{label} refuses it: {why}" for label, why in sorted(refusals.items()))
-    return ParamError(f"'{name}'{more} is not written, since {reasons}")
+    def _tick(self) -> None:
+        """Compare other programs' storages with the tree from time to time, if this is to do so."""
+        self._runner.worker.later(_TICK, self._tick)
+        self._runner.apply_deferred()
+        now = time.monotonic()
+        if not self._parameter_keys.subscribed:
+            self._reconcile_at = now
+        elif now >= self._reconcile_at and self._runner.core.is_oldest_seed:
+            self._reconcile_at = now + _RECONCILE_EVERY
+            # This waits for replies, which the worker must not.
+            target = self._parameter_keys.reconcile
+            start_thread(threading.Thread(target=target, name="rosz-params-mirror", daemon=True))
 
 
 class Follower(_Copy):
@@ -488,43 +344,15 @@ class Follower(_Copy):
     """
 
     def __init__(self, session: Session, domain: int, timeout: float) -> None:
-        super().__init__(session, domain)
-        self._subscriber = session.subscriber(f"{self._keys.change}/**", self._on_change)
+        member = ReplicaMember(session.stamp().time, session.zid, "")
+        super().__init__(session, domain, Config(member, session.secured, listens=True))
+        self._exchange.listen()
         try:
-            self._members.follow(_ignore, self._on_member, timeout)
-            if not self._members.zids:
-                self._members.follow_all(_READER, timeout)
-            self._join()
+            self._tokens.follow_seeds(timeout)
+            joined_others = self._runner.call(lambda call, _: JoinCalled(call))
         except BaseException:
             self.close()
             raise
-        self._worker.later(_COMPARE_EVERY, self._compare)
-
-    def close(self) -> None:
-        """Stop following; a second call has no effect."""
-        self._subscriber.close()
-        super().close()
-
-    def _join(self) -> None:
-        if not self._members.zids:
+        if not joined_others:
+            self.close()
             raise NoReplica(NO_REPLICA)
-        self._sync.join()
-
-    def _on_member(self, member: Member, alive: bool) -> None:
-        if not alive:
-            self._sync.drop_peer(member.zid)
-
-    def _on_change(self, sample: Sample) -> None:
-        payload, key = sample.payload, sample.key
-        # If the worker is busy, comparing finds the write.
-        self._worker.offer(lambda: self._receive(payload, key))
-
-    def _receive(self, payload: bytes, key: str) -> None:
-        try:
-            self._state.receive(payload, self._keys.change_reach(key))
-        except DecodeError as error:
-            self._state.damage.report(NOT_A_PARAMETER, error)
-
-    def _compare(self) -> None:
-        self._sync.compare_with_one()
-        self._worker.later(_COMPARE_EVERY, self._compare)

@@ -1,6 +1,6 @@
 """The services of a replica for programs that do not have one.
 
-`ClientServer` reads and writes for `rosz.params.remote.ParamClient`, mostly commands.
+`ClientServer` reads and writes for `rosz.params.replica.ParamClient`, mostly commands.
 
 `ParameterKeys` keeps one key for each parameter, for any Zenoh program and Zenoh's own storages.
 Every parameter that is not a dict has a key. Whoever sets the parameter writes the key while
@@ -13,23 +13,23 @@ replica compares it with the tree from time to time.
 from __future__ import annotations
 
 import logging
-import re
 import threading
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Final
 
-from rosz.errors import DecodeError, ParamError, ParamNotFound, RoszError
+from rosz.errors import DecodeError, ParamError, ParamNotFound, PartlyWritten, RoszError
 from rosz.lifecycle import Closable
 from rosz.params.paths import Path, split
-from rosz.params.replica.members import Core
-from rosz.params.replica.state import TreeReader, names_beside
-from rosz.params.replica.watch import TreeChange
+from rosz.params.replica.core.effects import TreeChanged
+from rosz.params.replica.reader import TreeReader, names_beside
+from rosz.params.replica.runner import CoreRunner
 from rosz.params.tree import MISSING, lookup
 from rosz.params.values import Value
 from rosz.params.wire import (
     ClientReply,
     ClientRequest,
+    Keys,
     check_reach,
     decode,
     decode_value,
@@ -38,14 +38,12 @@ from rosz.params.wire import (
     pack_value,
 )
 from rosz.params.writes import Change, Write, put
-from rosz.session import Query, Reply, Stamp
+from rosz.session import Query, Reply, Session, Stamp, is_key_in
 from rosz.worker import lend_thread
-
-__all__ = ("ClientServer", "ParameterKeys", "is_key_in")
 
 _log = logging.getLogger("rosz.params")
 
-_MAX_TIMEOUT: Final = 60.0
+_MAX_TIMEOUT: Final = 600.0
 """Longest time in seconds that a write for a client waits for the other replicas."""
 
 _MAX_WRITES: Final = 16
@@ -63,18 +61,19 @@ class ClientServer:
     """Reads on the replica's worker, and writes on a thread that is lent for each, for clients.
 
     Args:
-        core: Core of the replica.
+        session: Session of the replica.
+        keys: Keys of the domain.
+        runner: The replica's core.
         write: `Replica.write`.
-        is_ready: Function that tells whether the replica has joined.
     """
 
-    def __init__(self, core: Core, write: Callable[..., Any], is_ready: Callable[[], bool]) -> None:
-        session, keys = core.session, core.keys
-        self._state = core.state
-        self._reader = TreeReader(core.state)
+    def __init__(
+        self, session: Session, keys: Keys, runner: CoreRunner, write: Callable[..., Any]
+    ) -> None:
+        self._state = runner
+        self._reader = TreeReader(runner)
         self._write_batch = write
-        self._worker = core.worker
-        self._is_ready = is_ready
+        self._worker = runner.worker
         self._slots = threading.BoundedSemaphore(_MAX_WRITES)
         self._keys = keys
         self._set_key = keys.of(session.zid, "set")
@@ -101,7 +100,7 @@ class ClientServer:
     ) -> None:
         try:
             request = decode(payload, ClientRequest)
-            if self._is_ready():
+            if self._state.core.ready:
                 handle(query, request)
             else:
                 _reply(query, ClientReply("joining"))
@@ -134,6 +133,10 @@ class ClientServer:
     ) -> ClientReply:
         try:
             return verb(request)
+        except PartlyWritten as error:
+            reply = ClientReply("refused", text=str(error), slow=list(error.slow))
+            reply.holders, reply.reasons, reply.what = error.holders, error.reasons, error.what
+            return reply
         except ParamNotFound as error:
             beside = names_beside(self._state.root, split(request.name))
             return ClientReply("missing", text=str(error), value=beside)
@@ -149,8 +152,8 @@ class ClientServer:
             case "names":
                 return ClientReply(value=self._reader.names())
             case "search":
-                found = self._reader.search(request.name, request.node)
-                return ClientReply("missing" if found is None else "ok", value=found)
+                name = self._reader.search(request.name, request.node)
+                return ClientReply("missing" if name is None else "ok", value=name)
             case "stamp":
                 return ClientReply(value=self._state.stamp().time)
         raise ParamError(f"'{request.verb}' is not a known verb")
@@ -164,7 +167,7 @@ class ClientServer:
         stamp = Stamp(batch.time, batch.clock)
         timeout = min(request.timeout, _MAX_TIMEOUT)
         outcome = self._write_batch(changes, origin=batch.origin, stamp=stamp, timeout=timeout)
-        return ClientReply(slow=list(outcome.slow))
+        return ClientReply(slow=list(outcome.slow), holders=outcome.holders)
 
 
 def _reply(query: Query, reply: ClientReply) -> None:
@@ -179,14 +182,16 @@ class ParameterKeys:
     """Writes one key for each parameter, and answers queries on the keys.
 
     Args:
-        core: Core of the replica.
+        session: Session of the replica.
+        keys: Keys of the domain.
+        runner: The replica's core.
     """
 
-    def __init__(self, core: Core) -> None:
-        self._session = session = core.session
-        self._keys = keys = core.keys
-        self._state = core.state
-        self._worker = core.worker
+    def __init__(self, session: Session, keys: Keys, runner: CoreRunner) -> None:
+        self._session = session
+        self._keys = keys
+        self._state = runner
+        self._worker = runner.worker
         self._publisher = session.publisher(keys.all_params)
         self._queryable: Closable | None = None
         self._lock = threading.Lock()
@@ -217,23 +222,23 @@ class ParameterKeys:
                 self._queryable.close()
                 self._queryable = None
 
-    def publish(self, change: TreeChange) -> None:
+    def publish(self, change: TreeChanged) -> None:
         """Write the keys that a change concerns, in the background."""
         if self.subscribed:
             self._worker.submit(lambda: self._publish(change))
 
     def load(self) -> list[Write]:
         """Return the content of storages as writes."""
-        found = []
+        writes = []
         for reply in self._query_storages():
             try:
-                found.append(self._read(reply))
+                writes.append(self._read(reply))
             except DecodeError as error:
                 _log.warning("a storage holds something that is not a parameter: %s", error)
-        return found
+        return writes
 
     def reconcile(self) -> None:
-        """Make storages hold what the tree holds, and nothing else."""
+        """Make storages hold the values of the tree, and nothing else."""
         missing = dict(_keyed(self._state.root, ()))
         for reply in self._query_storages():
             try:
@@ -272,7 +277,7 @@ class ParameterKeys:
             raise DecodeError("parameter", -1, f"'{reply.key}' has no timestamp")
         return put(path, (stamp.time, stamp.id), decode_value(reply.payload), "a storage")
 
-    def _publish(self, change: TreeChange) -> None:
+    def _publish(self, change: TreeChanged) -> None:
         for write in change.writes:
             before, after = lookup(change.old, write.path), lookup(change.new, write.path)
             kept = dict(_keyed(after, write.path)) if after is not MISSING else {}
@@ -328,15 +333,12 @@ def _keyed(value: Value, path: Path) -> Iterator[tuple[Path, Value]]:
     A dict has a key of its own as well if a name in it is empty or holds a slash, because the keys
     of its items would mean other parameters.
     """
-    if type(value) is not dict or (not value and path) or not all(map(_is_part, value)):
+    are_parts = type(value) is dict and all(name and "/" not in name for name in value)
+    if not are_parts or (not value and path):
         yield path, value
         return
     for key, item in value.items():
         yield from _keyed(item, (*path, key))
-
-
-def _is_part(name: str) -> bool:
-    return bool(name) and "/" not in name
 
 
 def _leaves_above(root: Value, path: Path) -> Iterator[Path]:
@@ -345,30 +347,3 @@ def _leaves_above(root: Value, path: Path) -> Iterator[Path]:
         value = lookup(root, path[:depth])
         if value is not MISSING and type(value) is not dict:
             yield path[:depth]
-
-
-def is_key_in(expression: str, key: str) -> bool:
-    """Tell whether a Zenoh key expression includes a key."""
-    chunks = key.split("/")
-    reached = {0}
-    for part in expression.split("/"):
-        if not reached:
-            return False
-        if part == "**":
-            reached = set(range(min(reached), len(chunks) + 1))
-        else:
-            reached = {
-                place + 1
-                for place in reached
-                if place < len(chunks) and _is_chunk_in(part, chunks[place])
-            }
-    return len(chunks) in reached
-
-
-def _is_chunk_in(part: str, chunk: str) -> bool:
-    if part == "*":
-        return True
-    if "$*" not in part:
-        return part == chunk
-    pattern = ".*".join(re.escape(piece) for piece in part.split("$*"))
-    return re.fullmatch(pattern, chunk, re.DOTALL) is not None

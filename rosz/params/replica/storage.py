@@ -5,12 +5,11 @@ full synchronisation: when `StoreFile.save` returns, the writes are on the disk.
 before it is used. A damaged file is refused by name and left unchanged, so that its content can be
 rescued.
 
-`Storage` saves what a replica applies, on a thread of its own, and tells when it is stored.
+`Storage` saves the writes that a replica applies, on a thread of its own.
 """
 
 from __future__ import annotations
 
-import logging
 import sqlite3
 import threading
 import zlib
@@ -20,13 +19,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from rosz.errors import DecodeError, RoszError, StoreError
+from rosz.params.replica.core.effects import Compact, Save
+from rosz.params.replica.core.events import Saved
 from rosz.params.wire import decode_value, encode_value, join_path, split_path
 from rosz.params.writes import DELETED, Write, put
 from rosz.worker import Worker
-
-__all__ = ("Storage", "StoreFile")
-
-_log = logging.getLogger("rosz.params")
 
 _APPLICATION: Final = 0x726F737A
 """SQLite's application id of a file of parameters: "rosz" in ASCII."""
@@ -45,9 +42,6 @@ CREATE TABLE writes (
 ) WITHOUT ROWID
 """
 _HORIZON_SCHEMA: Final = "CREATE TABLE horizon (time INTEGER NOT NULL)"
-_RETRY_AFTER: Final = 1.0
-"""Seconds after which what could not be saved is tried again."""
-
 _HEADER: Final = b"SQLite format 3\0"
 _LOAD: Final = "SELECT path, time, clock, origin, value, sum FROM writes"
 _DELETE_HIDDEN: Final = """
@@ -206,8 +200,8 @@ class StoreFile:
         value, checksum = rest
         if checksum != _checksum(path, time, clock, origin, value):
             raise DecodeError("parameter", -1, f"the checksum of '/{path}' is not {checksum}")
-        found = DELETED if value is None else decode_value(value)
-        return put(split_path(path), (time, clock), found, origin)
+        content = DELETED if value is None else decode_value(value)
+        return put(split_path(path), (time, clock), content, origin)
 
     @contextmanager
     def _errors(self, what: str) -> Iterator[None]:
@@ -240,19 +234,20 @@ def _checksum(path: str, time: int, clock: str, origin: str, value: bytes | None
 
 
 class Storage:
-    """Saves the new writes of a replica on a thread of its own, many at a time.
+    """Saves the writes of a replica on a thread of its own, many at a time.
 
     Args:
         file: File that the writes are saved in.
+
+    Attributes:
+        on_saved: Function called on that thread with what is done; see `Saved`.
     """
 
     def __init__(self, file: StoreFile) -> None:
+        self.on_saved: Callable[[Saved], object] = bool
         self._file = file
         self._worker: Worker[Callable[[], object]] = Worker("rosz-params-save")
-        self._unsaved: list[Write] = []
-        self._waiting: list[Callable[[str], object]] = []
-        self._failing = False
-        self._retrying = False
+        self._batch: list[Save] = []
 
     def load(self) -> tuple[list[Write], int]:
         """Return the stored writes, and the time up to which deletions may be forgotten.
@@ -262,72 +257,35 @@ class Storage:
         """
         return self._file.load()
 
-    def save(self, writes: list[Write]) -> None:
+    def save(self, effect: Save | Compact) -> None:
         """Save writes soon."""
-        self._worker.submit(lambda: self._add(writes, None))
-
-    def when_stored(self, then: Callable[[str], object]) -> None:
-        """Call a function, on the thread of the storage, when all writes so far are stored.
-
-        Args:
-            then: Function called with the reason why they cannot be stored; empty if they are.
-        """
-        self._worker.submit(lambda: self._add([], then))
-
-    def compact(self, snapshot: Callable[[], tuple[list[Write], int]]) -> None:
-        """Replace the content of the file soon, by what a function returns then."""
-        self._worker.submit(lambda: self._replace(snapshot))
+        self._worker.submit(lambda: self._do(effect))
 
     def close(self) -> None:
-        """Save what is left and close the file; a second call has no effect."""
+        """Save the last writes and close the file; a second call has no effect."""
         self._worker.submit(self._flush)
         self._worker.close()
         self._file.close()
 
-    def _add(self, writes: list[Write], then: Callable[[str], object] | None) -> None:
-        self._unsaved += writes
-        if then is not None:
-            self._waiting.append(then)
-        if not self._worker.waiting:  # else the next task saves these as well
-            self._flush()
-
-    def _replace(self, snapshot: Callable[[], tuple[list[Write], int]]) -> None:
-        # Writes applied meanwhile are in the snapshot, or are saved after it.
-        writes, horizon = snapshot()
-        try:
-            self._file.replace(writes, horizon)
-        except RoszError as error:
-            _log.debug("old parameters stay in the file: %s", error)
-            self._unsaved += writes
+    def _do(self, effect: Save | Compact) -> None:
+        if isinstance(effect, Save):
+            self._batch.append(effect)
+            if not self._worker.waiting:  # else the next task saves these as well
+                self._flush()
+            return
         self._flush()
+        self._report(effect.number, lambda: self._file.replace(effect.writes, effect.horizon))
 
     def _flush(self) -> None:
-        writes, self._unsaved = self._unsaved, []
-        waiting, self._waiting = self._waiting, []
+        batch, self._batch = self._batch, []
+        if batch:
+            writes = [write for save in batch for write in save.writes]
+            self._report(batch[-1].number, lambda: self._file.save(writes))
+
+    def _report(self, number: int, save: Callable[[], object]) -> None:
         reason = ""
         try:
-            if writes:
-                self._file.save(writes)
+            save()
         except RoszError as error:
             reason = str(error)
-            # The disk may stay full for long, so only the newest write of each path is kept.
-            self._unsaved = list({write.path: write for write in writes}.values())
-        self._report(reason)
-        for then in waiting:
-            then(reason)
-
-    def _report(self, reason: str) -> None:
-        """Log when saving begins to fail and when it works again; try again while it fails."""
-        if reason and not self._failing:
-            _log.error("parameters cannot be saved, so none are set: %s", reason)
-        elif self._failing and not reason:
-            _log.warning("parameters are saved again")
-        self._failing = bool(reason)
-        if reason and not self._retrying:
-            self._retrying = True
-            self._worker.later(_RETRY_AFTER, self._retry)
-
-    def _retry(self) -> None:
-        self._retrying = False
-        if self._failing:
-            self._flush()
+        self.on_saved(Saved(number, reason))

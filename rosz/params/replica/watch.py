@@ -6,35 +6,20 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Final, Self
+from typing import Final
 
 import msgspec
 
+from rosz.lifecycle import Closing
 from rosz.params.paths import Path, joined
-from rosz.params.tree import MISSING, Missing, Tree, lookup
+from rosz.params.replica.core.effects import TreeChanged
+from rosz.params.tree import MISSING, Missing, lookup
 from rosz.params.values import Value, copy
-from rosz.params.writes import Write
 from rosz.worker import Worker
-
-__all__ = ("Callback", "Changed", "TreeChange", "Watch", "Watchers", "is_same")
 
 _log = logging.getLogger("rosz.params")
 _MAX_BACKLOG: Final = 1000
 """Changes that wait for a slow callback; of more, only the newest of each path is kept."""
-
-
-class TreeChange(msgspec.Struct, frozen=True):
-    """A change of the tree.
-
-    Attributes:
-        old: Tree before.
-        new: Tree after.
-        writes: New writes that made the change.
-    """
-
-    old: Tree
-    new: Tree
-    writes: list[Write]
 
 
 class Changed(msgspec.Struct, frozen=True):
@@ -64,7 +49,7 @@ class Changed(msgspec.Struct, frozen=True):
 Callback = Callable[[Changed], None]
 
 
-class Watch:
+class Watch(Closing):
     """A callback on changes of a name; `close` ends it.
 
     Attributes:
@@ -83,12 +68,6 @@ class Watch:
         """End the watch; a second call has no effect."""
         self._owner.remove(self)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 class Watchers:
     """All watches of one copy of the store, and the thread that calls their callbacks.
@@ -98,7 +77,7 @@ class Watchers:
 
     def __init__(self) -> None:
         self._watches: tuple[Watch, ...] = ()
-        self._backlog: deque[TreeChange] = deque()
+        self._backlog: deque[TreeChanged] = deque()
         self._lock = threading.RLock()
         self._worker: Worker[Callable[[], object]] | None = None
         self._closed = False
@@ -122,7 +101,7 @@ class Watchers:
         with self._lock:
             self._watches = tuple(other for other in self._watches if other is not watch)
 
-    def notify(self, change: TreeChange) -> None:
+    def notify(self, change: TreeChanged) -> None:
         """Queue a change for the callbacks; must be called in the order of the changes."""
         if not self._watches:
             return
@@ -177,18 +156,20 @@ def is_same(left: Value | Missing, right: Value | Missing) -> bool:
     return bool(left == right) or (left != left and right != right)  # noqa: PLR0124  # nan
 
 
-def _condense(changes: deque[TreeChange]) -> TreeChange:
+def _condense(changes: deque[TreeChanged]) -> TreeChanged:
     """Return one change with the effect of several: the newest write of each path."""
     newest = {write.path: write for change in changes for write in change.writes}
-    return TreeChange(changes[0].old, changes[-1].new, list(newest.values()))
+    return TreeChanged(changes[0].old, changes[-1].new, list(newest.values()))
 
 
-def _changes_seen(path: Path, change: TreeChange) -> Iterator[Changed]:
-    """Yield what a watch of a path is notified of for a change of the tree."""
+def _changes_seen(path: Path, change: TreeChanged) -> Iterator[Changed]:
+    """Yield the notifications of a watch of a path for a change of the tree."""
     depth = len(path)
     seen: set[Path] = set()
     for write in change.writes:
-        place = write.path if write.path[:depth] == path else path
+        place = _changed_place(change, write.path) if write.path[:depth] == path else path
+        if place[:depth] != path:
+            continue
         if place is path and path[: len(write.path)] != write.path:
             continue
         if place in seen:
@@ -199,6 +180,18 @@ def _changes_seen(path: Path, change: TreeChange) -> Iterator[Changed]:
             yield Changed(
                 joined(place), _copy_or_none(old), _copy_or_none(new), write.origin, write.time
             )
+
+
+def _changed_place(change: TreeChanged, path: Path) -> Path:
+    """Return the path that a write changed: its own, or a leaf above it that is a dict now.
+
+    A deletion turns all above it into dicts, though another has written a leaf there meanwhile.
+    """
+    place = path
+    while place and lookup(change.old, place) is lookup(change.new, place) is MISSING:
+        place = place[:-1]
+    was_dict = type(lookup(change.old, place)) is dict
+    return path if was_dict and type(lookup(change.new, place)) is dict else place
 
 
 def _copy_or_none(value: Value | Missing) -> Value | None:

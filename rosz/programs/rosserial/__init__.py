@@ -3,35 +3,23 @@
 May import everything below the command line.
 """
 
-from rosz.programs.rosserial.device import Device, TypeMismatch, UnknownTopic
-from rosz.programs.rosserial.link import Link
+from rosz.programs.rosserial.device import DeviceService, Half, check_definition
+from rosz.programs.rosserial.link import DevicePort, FilePort, Link, open_serial
 from rosz.programs.rosserial.packets import Damage, Packet, PacketReader, pack
-from rosz.programs.rosserial.ports import (
-    FilePort,
-    MissingSerial,
-    Port,
-    SerialPort,
-    SocketPort,
-    open_serial,
-)
-from rosz.programs.rosserial.server import TcpServer, main, serve_line
+from rosz.programs.rosserial.server import TcpServer, main
 
 __all__ = (
     "Damage",
-    "Device",
+    "DevicePort",
+    "DeviceService",
     "FilePort",
+    "Half",
     "Link",
-    "MissingSerial",
     "Packet",
     "PacketReader",
-    "Port",
-    "SerialPort",
-    "SocketPort",
     "TcpServer",
-    "TypeMismatch",
-    "UnknownTopic",
+    "check_definition",
     "main",
     "open_serial",
     "pack",
-    "serve_line",
 )

@@ -6,11 +6,13 @@ import queue
 import struct
 import threading
 from collections.abc import Callable
-from typing import Any, Protocol
+from functools import partial
+from typing import Any
 
 import msgspec
 
 from rosz.errors import ClosedError, DecodeError, EncodeError, ParamError, RoszError, ServiceError
+from rosz.lifecycle import Closable
 from rosz.message import Message, Service
 from rosz.msgs.rosserial_msgs.msg import Log, TopicInfo
 from rosz.msgs.rosserial_msgs.srv import RequestParam
@@ -18,22 +20,16 @@ from rosz.node import Client, Node, Publisher, Subscription
 from rosz.programs.rosserial.packets import Packet
 from rosz.worker import Worker
 
-__all__ = ("Device", "TypeMismatch", "UnknownTopic")
-
 _NANOSECONDS = 1_000_000_000
 _RESPONSE_SECONDS = 30.0
+# Calls of the device that wait at once; a call may take long, and must not stop the reading.
 _CALLS = 8
 _ID_OF_REQUESTS = TopicInfo.ID_SUBSCRIBER
 _ID_OF_RESPONSES = TopicInfo.ID_PUBLISHER
 
 
 class TypeMismatch(RoszError):
-    """The device has another definition of a type.
-
-    Args:
-        info: What the device has announced.
-        expected: MD5 of the type here.
-    """
+    """The device has announced another definition of a type than the MD5 of the one here."""
 
     def __init__(self, info: TopicInfo, expected: str) -> None:
         super().__init__(
@@ -44,56 +40,62 @@ class TypeMismatch(RoszError):
 
 
 class UnknownTopic(RoszError):
-    """The device uses a topic ID that it has not announced.
-
-    Args:
-        topic: The ID.
-    """
+    """The device uses a topic ID that it has not announced."""
 
     def __init__(self, topic: int) -> None:
         super().__init__(f"the device sent a packet of topic {topic} before it announced that")
 
 
-class _Closable(Protocol):
-    def close(self) -> None: ...
+def check_definition(info: TopicInfo, kind: type[Message]) -> type[Message]:
+    """Return a class that has the MD5 which the device announced.
+
+    Raises:
+        TypeMismatch: It has another one.
+    """
+    if kind._md5sum != info.md5sum:
+        raise TypeMismatch(info, kind._md5sum)
+    return kind
 
 
-class _Output(msgspec.Struct):
-    """A topic that the device publishes."""
-
-    info: TopicInfo
-    publisher: Publisher[Any]
-
-
-class _Input(msgspec.Struct):
+class _SubscribedTopic(msgspec.Struct):
     """A topic that the device subscribes to."""
 
     info: TopicInfo
     subscription: Subscription[Any] | None = None
 
 
-class _Half(msgspec.Struct):
-    """One way of a service: its ID, and the class of what goes there."""
+class Half(msgspec.Struct):
+    """One direction of a service.
+
+    Attributes:
+        info: The announcement of the device, which has the topic ID.
+        kind: Class of the messages in this direction.
+    """
 
     info: TopicInfo
     kind: type[Message]
 
 
-class _Served:
+class DeviceService:
     """A service of the device.
 
     It gets one request at a time, since a response does not say which request it belongs to.
 
     Args:
         send: Function that sends a message to the device.
+
+    Attributes:
+        request: The direction of the requests; None until the device has announced it.
+        response: That of the responses.
+        offered: Whether the node offers the service.
     """
 
-    def __init__(self, send: Callable[[TopicInfo, Message], None]) -> None:
+    def __init__(self, send: Callable[[TopicInfo, Any], None]) -> None:
         self._send = send
         self._lock = threading.Lock()
         self._responses: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
-        self.request: _Half | None = None
-        self.response: _Half | None = None
+        self.request: Half | None = None
+        self.response: Half | None = None
         self.offered = False
         self._closed = False
 
@@ -133,32 +135,28 @@ class _Served:
 class Device:
     """A device on the network of ROS.
 
-    Args:
-        node: The node that stands for the device.
-        send: Function that sends a packet to the device.
-
     Attributes:
-        callbacks: Functions that handle what comes from the device, by topic IDs. They come before
+        callbacks: Functions that handle packets of the device, by topic IDs. They come before
             those for the topics and services that it has announced.
     """
 
     def __init__(self, node: Node, send: Callable[[Packet], object]) -> None:
         self._node = node
         self._send_packet = send
-        self._outputs: dict[int, _Output] = {}
-        self._inputs: dict[str, _Input] = {}
-        self._servers: dict[str, _Served] = {}
+        self._outputs: dict[int, tuple[TopicInfo, Publisher[Any]]] = {}
+        self._inputs: dict[str, _SubscribedTopic] = {}
+        self._servers: dict[str, DeviceService] = {}
         self._clients: dict[str, Client] = {}
         self._responses: dict[str, TopicInfo] = {}
-        self._parts: list[_Closable] = []
+        self._parts: list[Closable] = []
         self._calls: Worker[Callable[[], object]] = Worker("rosz-rosserial", threads=_CALLS)
         self._handlers: dict[int, Callable[[bytes], object]] = {}
         server, client = TopicInfo.ID_SERVICE_SERVER, TopicInfo.ID_SERVICE_CLIENT
         self.callbacks: dict[int, Callable[[bytes], object]] = {
             TopicInfo.ID_PUBLISHER: self._announced(self._publish),
             TopicInfo.ID_SUBSCRIBER: self._announced(self._subscribe),
-            server + _ID_OF_RESPONSES: self._announced(self._serve_response),
-            server + _ID_OF_REQUESTS: self._announced(self._serve_request),
+            server + _ID_OF_RESPONSES: self._announced(partial(self._note_service, response=True)),
+            server + _ID_OF_REQUESTS: self._announced(partial(self._note_service, response=False)),
             client + TopicInfo.ID_PUBLISHER: self._announced(self._call_request),
             client + TopicInfo.ID_SUBSCRIBER: self._announced(self._call_response),
             TopicInfo.ID_PARAMETER_REQUEST: self._send_parameter,
@@ -167,11 +165,7 @@ class Device:
         }
 
     def receive(self, packet: Packet) -> None:
-        """Handle a packet of the device.
-
-        Raises:
-            UnknownTopic: The device has not announced its topic.
-        """
+        """Handle a packet of the device; raise `UnknownTopic` if its topic is not announced."""
         handler = self.callbacks.get(packet.topic) or self._handlers.get(packet.topic)
         if handler is None:
             raise UnknownTopic(packet.topic)
@@ -204,7 +198,7 @@ class Device:
         return received
 
     def _message_class(self, info: TopicInfo) -> type[Message]:
-        return _checked(info, self._node.context.types.message(info.message_type))
+        return check_definition(info, self._node.context.types.message(info.message_type))
 
     def _send(self, info: TopicInfo, message: Message) -> None:
         payload = message.to_ros1()
@@ -219,45 +213,44 @@ class Device:
         self._send_packet(Packet(info.topic_id, payload))
 
     def _publish(self, info: TopicInfo) -> None:
-        known = self._outputs.get(info.topic_id)
-        if known is not None and known.info == info:
+        earlier, publisher = self._outputs.get(info.topic_id, (None, None))
+        if earlier == info:
             return
         kind = self._message_class(info)
-        if known is not None:
-            known.publisher.close()
-        publisher = self._keep(self._node.publisher(info.topic_name, kind))
-        self._outputs[info.topic_id] = _Output(info, publisher)
-        self._handlers[info.topic_id] = lambda data: publisher.publish(kind.from_ros1(data))
+        if publisher is not None:
+            publisher.close()
+        made = self._keep(self._node.publisher(info.topic_name, kind))
+        self._outputs[info.topic_id] = info, made
+        self._handlers[info.topic_id] = lambda data: made.publish(kind.from_ros1(data))
         self._node.log.info("Setup publisher on %s [%s]", info.topic_name, info.message_type)
 
     def _subscribe(self, info: TopicInfo) -> None:
-        known = self._inputs.get(info.topic_name)
+        before = self._inputs.get(info.topic_name)
         kind = self._message_class(info)
-        if known is not None and known.info.message_type == info.message_type:
-            known.info = info  # the ID may be another one now
+        if before is not None and before.info.message_type == info.message_type:
+            before.info = info  # the ID may be another one now
             return
-        if known is not None and known.subscription is not None:
-            known.subscription.close()
-        entry = self._inputs[info.topic_name] = _Input(info)
+        if before is not None and before.subscription is not None:
+            before.subscription.close()
+        entry = self._inputs[info.topic_name] = _SubscribedTopic(info)
         entry.subscription = self._keep(
             self._node.subscription(info.topic_name, kind, lambda m: self._send(entry.info, m))
         )
         self._node.log.info("Setup subscriber on %s [%s]", info.topic_name, info.message_type)
 
-    def _serve_request(self, info: TopicInfo) -> None:
+    def _note_service(self, info: TopicInfo, *, response: bool) -> None:
+        """Note one direction of a service of the device."""
         service = self._node.context.types.service(info.message_type)
-        served = self._servers.setdefault(info.topic_name, _Served(self._send))
-        served.request = _Half(info, _checked(info, service.Request))
+        served = self._servers.setdefault(info.topic_name, DeviceService(self._send))
+        half = Half(info, check_definition(info, service.Response if response else service.Request))
+        if response:
+            served.response = half
+            self._handlers[info.topic_id] = served.receive
+        else:
+            served.request = half
         self._serve(served, info.topic_name, service)
 
-    def _serve_response(self, info: TopicInfo) -> None:
-        service = self._node.context.types.service(info.message_type)
-        served = self._servers.setdefault(info.topic_name, _Served(self._send))
-        served.response = _Half(info, _checked(info, service.Response))
-        self._handlers[info.topic_id] = served.receive
-        self._serve(served, info.topic_name, service)
-
-    def _serve(self, served: _Served, name: str, kind: type[Service]) -> None:
+    def _serve(self, served: DeviceService, name: str, kind: type[Service]) -> None:
         """Offer a service of the device once both ways are announced."""
         if served.offered or served.request is None or served.response is None:
             return
@@ -267,7 +260,7 @@ class Device:
 
     def _call_request(self, info: TopicInfo) -> None:
         service = self._node.context.types.service(info.message_type)
-        request = _checked(info, service.Request)
+        request = check_definition(info, service.Request)
         client = self._clients.get(info.topic_name)
         if client is None or client.service_type is not service:
             client = self._keep(self._node.client(info.topic_name, service))
@@ -283,7 +276,7 @@ class Device:
 
     def _call_response(self, info: TopicInfo) -> None:
         service = self._node.context.types.service(info.message_type)
-        _checked(info, service.Response)
+        check_definition(info, service.Response)
         self._responses[info.topic_name] = info
 
     def _call(self, client: Client, name: str, request: Message) -> None:
@@ -307,7 +300,7 @@ class Device:
         if value is None:
             raise ParamError(f"parameter '{name}' is not set")
         values = value if isinstance(value, list) else [value]
-        kinds = {type(one) for one in values}
+        kinds = {type(element) for element in values}
         if len(kinds) > 1 or not kinds <= {bool, int, float, str}:
             raise ParamError(
                 f"parameter '{name}' is {value!r}; a device takes a number, a truth value, a text,"
@@ -315,7 +308,7 @@ class Device:
             )
         response = RequestParam.Response()
         if kinds <= {bool, int}:
-            response.ints = [int(one) for one in values]
+            response.ints = [int(element) for element in values]
         elif kinds == {float}:
             response.floats = values
         else:
@@ -337,14 +330,3 @@ class Device:
     def _keep(self, part: Any) -> Any:
         self._parts.append(part)
         return part
-
-
-def _checked(info: TopicInfo, kind: type[Message]) -> type[Message]:
-    """Return a class that has the MD5 which the device announced.
-
-    Raises:
-        TypeMismatch: It has another one.
-    """
-    if kind._md5sum != info.md5sum:
-        raise TypeMismatch(info, kind._md5sum)
-    return kind

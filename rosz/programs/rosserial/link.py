@@ -1,10 +1,14 @@
-"""The link to one device, from the opening of its port until the device is gone."""
+"""The link to one device, on a serial line, a TCP connection, or a file object of a program."""
 
 from __future__ import annotations
 
+import select
+import socket
 import time
+from contextlib import suppress
+from typing import Any, Protocol
 
-from rosz.errors import ClosedError
+from rosz.errors import ClosedError, RoszError
 from rosz.lifecycle import Lifecycle
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -12,17 +16,135 @@ from rosz.msgs.rosserial_msgs.msg import TopicInfo
 from rosz.node import Node
 from rosz.programs.rosserial.device import Device, UnknownTopic
 from rosz.programs.rosserial.packets import Damage, Packet, PacketReader, pack
-from rosz.programs.rosserial.ports import Port
 from rosz.worker import Worker
 
-__all__ = ("Link",)
-
-_NANOSECONDS = 1_000_000_000
 _REQUEST = Packet(TopicInfo.ID_PUBLISHER, b"")
 _STOP = Packet(TopicInfo.ID_TX_STOP, b"")
+# Packets that wait for the line, which is often slower than the topics that it carries.
 _WAITING = 1000
 _SILENCES = 3
 _REQUEST_SECONDS = 1.0
+_READ_SECONDS = 0.5
+_WRITE_SECONDS = 10.0
+_READ_SIZE = 4096
+
+
+class MissingSerial(RoszError):
+    """The distribution that opens serial ports is not installed."""
+
+
+class DevicePort(Protocol):
+    """A way to a device. Its methods raise OSError when the device is gone."""
+
+    def read(self) -> bytes:
+        """Return the bytes that have arrived; none if none arrive for half a second."""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+
+    def wake(self) -> None:
+        """End a `read` of another thread."""
+
+    def close(self) -> None:
+        """Close the port; no other thread may read."""
+
+
+class SocketPort:
+    """A TCP connection."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+        connection.settimeout(_WRITE_SECONDS)
+
+    def read(self) -> bytes:
+        """Return the bytes that have arrived; none if none arrive for half a second."""
+        if not select.select([self._connection], [], [], _READ_SECONDS)[0]:
+            return b""
+        data = self._connection.recv(_READ_SIZE)
+        if not data:
+            raise ConnectionError("the connection was closed")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._connection.sendall(data)
+
+    def wake(self) -> None:
+        """End a `read` of another thread."""
+        with suppress(OSError):  # the other end may be gone
+            self._connection.shutdown(socket.SHUT_RD)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close()
+
+
+class FilePort:
+    """An object with the methods of pyserial's ``Serial``, which the caller keeps open.
+
+    Args:
+        file: The object; its ``read`` returns after a time limit of its own.
+    """
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+
+    def read(self) -> bytes:
+        """Return the bytes that have arrived; at most one if the object does not count them."""
+        count = getattr(self._file, "in_waiting", None)
+        if count is None:
+            count = self._file.inWaiting() if hasattr(self._file, "inWaiting") else 1
+        return bytes(self._file.read(max(1, count)))
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._file.write(data)
+
+    def wake(self) -> None:
+        """End a `read` of another thread, if the object can."""
+        if hasattr(self._file, "cancel_read"):
+            self._file.cancel_read()
+
+    def close(self) -> None:
+        """Leave the object open."""
+
+
+class SerialPort(FilePort):
+    """A serial line, which the port closes."""
+
+    def close(self) -> None:
+        """Close the line."""
+        self._file.close()
+
+
+def open_serial(path: str, baud: int, *, handshake: bool = False) -> SerialPort:
+    """Open a serial line.
+
+    Args:
+        path: The device, such as ``/dev/ttyUSB0``, or a URL of pyserial.
+        baud: Bits per second.
+        handshake: Whether to use RTS/CTS and DSR/DTR.
+
+    Raises:
+        OSError: It cannot be opened.
+        MissingSerial: pyserial is not installed.
+    """
+    try:
+        import serial
+    except ModuleNotFoundError as error:
+        raise MissingSerial("pyserial is not installed; run: pip install 'rosz[serial]'") from error
+    try:
+        line = serial.serial_for_url(
+            path,
+            baud,
+            timeout=_READ_SECONDS,
+            write_timeout=_WRITE_SECONDS,
+            rtscts=handshake,
+            dsrdtr=handshake,
+        )
+    except ValueError as error:  # a rate that the line does not have
+        raise OSError(str(error)) from error
+    return SerialPort(line)
 
 
 class Link:
@@ -37,7 +159,7 @@ class Link:
     """
 
     def __init__(
-        self, node: Node, port: Port, *, timeout: float = 5.0, startup: float = 2.0
+        self, node: Node, port: DevicePort, *, timeout: float = 5.0, startup: float = 2.0
     ) -> None:
         self._node = node
         self._port = port
@@ -65,8 +187,8 @@ class Link:
                 data = self._port.read()
                 if self._failure is not None:
                     raise self._failure
-                for found in reader.feed(data) if data else reader.expire():
-                    self._handle(found)
+                for received in reader.feed(data) if data else reader.expire():
+                    self._handle(received)
                 self._keep_sync()
         except (OSError, ClosedError):
             if not self._lifecycle.closing and not self._node.is_shutdown:
@@ -121,16 +243,16 @@ class Link:
             self._failure = error
             self._port.wake()
 
-    def _handle(self, found: Packet | Damage) -> None:
-        if isinstance(found, Damage):
-            self._node.log.warning("damaged data from the device: %s", found.reason)
+    def _handle(self, received: Packet | Damage) -> None:
+        if isinstance(received, Damage):
+            self._node.log.warning("damaged data from the device: %s", received.reason)
             return
         self._heard = time.monotonic()
         if not self._last_sync:
             self._request_due = self._heard
         self._last_sync = time.time()
         try:
-            self.device.receive(found)
+            self.device.receive(received)
         except UnknownTopic as error:
             if self._requested:
                 self._node.log.warning("%s; its topics are requested again", error)
@@ -161,5 +283,5 @@ class Link:
             values=[KeyValue(key="last sync", value=last)],
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp = Time(*divmod(self._node.now(), _NANOSECONDS))
+        message.header.stamp = Time.from_nsec(self._node.now())
         self._diagnostics.publish(message)

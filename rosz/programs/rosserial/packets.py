@@ -13,8 +13,6 @@ from typing import NamedTuple
 
 from rosz.errors import EncodeError
 
-__all__ = ("Damage", "Packet", "PacketReader", "pack")
-
 _SYNC = 0xFF
 _VERSION = 0xFE
 _VERSIONS = {0xFF: "rosserial 0.4 and earlier", 0xFD: "a later version of rosserial"}
@@ -39,7 +37,7 @@ class Damage(NamedTuple):
     """Bytes that are not a packet.
 
     Attributes:
-        reason: What is wrong with them.
+        reason: The fault.
     """
 
     reason: str
@@ -67,10 +65,10 @@ def pack(packet: Packet) -> bytes:
 
 
 class PacketReader:
-    """Packets from bytes that arrive in pieces, with damaged ones among them.
+    """Reads packets, some of them damaged, from bytes that arrive in pieces.
 
     After damage, the search for the next packet begins at the byte behind the one that looked like
-    a beginning, so that a packet inside of what was taken for another one is not lost.
+    a beginning, so that a packet is not lost inside of bytes that were taken for another one.
     """
 
     def __init__(self) -> None:
@@ -78,29 +76,29 @@ class PacketReader:
         self._reported: set[str] = set()
 
     def feed(self, data: bytes) -> Iterator[Packet | Damage]:
-        """Take bytes, and yield what they complete; each kind of damage once until a packet.
+        """Take bytes, and yield the packets in them; each kind of damage once until a packet.
 
         Args:
             data: Bytes that have arrived.
         """
         self._buffer += data
-        while (found := self._next()) is not None:
-            if isinstance(found, Packet):
+        while (result := self._next()) is not None:
+            if isinstance(result, Packet):
                 self._reported.clear()
-                yield found
-            elif found not in self._reported:
-                self._reported.add(found)
-                yield Damage(found)
+                yield result
+            elif result not in self._reported:
+                self._reported.add(result)
+                yield Damage(result)
 
     def expire(self) -> Iterator[Packet | Damage]:
-        """Give up the packet that has begun, since the rest of it does not come."""
+        """Give up a packet that has begun, since its rest does not come."""
         if self._buffer:
             del self._buffer[0]
             yield Damage("the rest of a packet did not arrive")
             yield from self.feed(b"")
 
     def _next(self) -> Packet | str | None:
-        """Return the next packet, or what is wrong with the next bytes; None to wait for more."""
+        """Return the next packet, or the damage of the next bytes; None to wait for more."""
         buffer = self._buffer
         start = buffer.find(_SYNC)
         if start:
@@ -131,10 +129,10 @@ class PacketReader:
         return reason
 
 
-def _other_version(found: int) -> str:
-    known = _VERSIONS.get(found)
+def _other_version(version: int) -> str:
+    program = _VERSIONS.get(version)
     return (
-        f"protocol version 0x{found:02x}{f' ({known})' if known else ''}, expected"
+        f"protocol version 0x{version:02x}{f' ({program})' if program else ''}, expected"
         f" 0x{_VERSION:02x} (rosserial 0.5 and later): sync is lost, or the device has another"
         " version"
     )

@@ -9,15 +9,19 @@ from typing import Any
 
 from rosz.errors import ClosedError
 from rosz.node import Node, serve_loggers
-from rosz.programs.rosserial.link import Link
-from rosz.programs.rosserial.ports import MissingSerial, Port, SocketPort, open_serial
+from rosz.programs.rosserial.link import (
+    DevicePort,
+    Link,
+    MissingSerial,
+    SocketPort,
+    open_serial,
+)
+from rosz.remap import parse
 from rosz.worker import Worker
-
-__all__ = ("TcpServer", "main", "serve_line")
 
 _RETRY_SECONDS = 1.0
 _ACCEPT_SECONDS = 0.5
-_DEVICES = 64
+_DEVICES = 64  # each keeps a thread as long as it is connected
 _USAGE = "usage: serial_node.py [PORT|tcp [TCP_PORT]] [_port:=…] [_baud:=…] [_tcp_port:=…]"
 
 
@@ -55,7 +59,7 @@ class TcpServer:
             self._socket.close()
             workers.close()
 
-    def _serve(self, port: Port, where: str) -> None:
+    def _serve(self, port: DevicePort, where: str) -> None:
         try:
             Link(self._node, port, startup=0.0).run()
         except OSError as error:
@@ -65,15 +69,7 @@ class TcpServer:
 def serve_line(node: Node, path: str, baud: int, *, handshake: bool, startup: float) -> None:
     """Serve the device on a serial line until the node ends, also after it was unplugged.
 
-    Args:
-        node: The node that stands for the device.
-        path: The line, such as ``/dev/ttyUSB0``.
-        baud: Bits per second.
-        handshake: Whether to use RTS/CTS and DSR/DTR.
-        startup: Seconds that the device needs to start when the line is opened.
-
-    Raises:
-        MissingSerial: pyserial is not installed.
+    ``startup`` are the seconds that the device needs to start when the line is opened.
     """
     reported = ""
     while not node.is_shutdown:
@@ -97,7 +93,7 @@ def serve_line(node: Node, path: str, baud: int, *, handshake: bool, startup: fl
 
 def main() -> None:
     """Serve a device, or a TCP port, until the node is shut down."""
-    words = [word for word in sys.argv[1:] if ":=" not in word]
+    words = list(parse(sys.argv[1:]).rest)
     if len(words) > len(("port", "tcp_port")):
         sys.exit(_USAGE)
     with Node("serial_node") as node:

@@ -13,33 +13,31 @@ from typing import Any
 
 import yaml
 
-from rosz.errors import NotFoundError, RoszError
-from rosz.introspect.fields import Target, find_target
-from rosz.message.convert import fill_message_args
+from rosz.errors import RoszError
+from rosz.introspect import Target, find_target, resolve_field, topic_types, wait_for_target
+from rosz.message import fill_message_args
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.node import Node, serve_loggers
-from rosz.programs.topic_tools.passing import words
-
-__all__ = ("relay_field", "transform")
-
-_FOREVER = 1e9
-_NANOSECONDS = 1_000_000_000
+from rosz.remap import parse
 
 
 def transform() -> None:
-    """Publish what an expression makes of each message."""
-    parser = _parser("Publish what a Python expression makes of each message, or field, 'm'.")
+    """Publish the value of an expression for each message."""
+    parser = _parser("Publish the value of a Python expression for each message, or field, 'm'.")
     parser.add_argument("expression", nargs="?", default="m", help="expression with 'm' in it")
     parser.add_argument(
         "-i", "--import", dest="modules", nargs="+", default=["numpy"], help="modules to import"
     )
     parser.add_argument("--latch", action="store_true", help="keep the last message for newcomers")
-    options = parser.parse_args(words())
+    options = parser.parse_args(list(parse(sys.argv[1:]).rest))
     modules = _import_all(options.modules)
-    code = _compile(parser, options.expression)
+    try:
+        code = compile(options.expression.strip(), "<expression>", "eval")
+    except SyntaxError as error:
+        parser.error(f"'{options.expression}' is not a Python expression: {error.msg}")
 
     def make(node: Node, message_type: type[Any], part: Any) -> Any:  # noqa: ARG001
-        result = eval(code, dict(modules), {"m": part})  # noqa: S307  # what the program is for
+        result = eval(code, dict(modules), {"m": part})  # noqa: S307  # the purpose of the program
         return message_type(*(result if isinstance(result, list | tuple) else [result]))
 
     _run("transform", options, make, latch=options.latch)
@@ -49,7 +47,7 @@ def relay_field() -> None:
     """Publish messages whose fields are expressions on each message."""
     parser = _parser("Publish messages whose fields are given in YAML, as expressions on 'm'.")
     parser.add_argument("expression", help="fields in YAML, such as 'frame_id: m.data'")
-    options = parser.parse_args(words())
+    options = parser.parse_args(list(parse(sys.argv[1:]).rest))
     try:
         fields = yaml.safe_load(options.expression)
     except yaml.YAMLError as error:
@@ -58,7 +56,7 @@ def relay_field() -> None:
         parser.error(f"expected fields in YAML, such as 'data: m.x', got '{options.expression}'")
 
     def make(node: Node, message_type: type[Any], part: Any) -> Any:
-        now = Time(*divmod(node.now(), _NANOSECONDS))
+        now = Time.from_nsec(node.now())
         message = message_type()
         fill_message_args(message, [_evaluate(fields, part)], {"now": now})
         return message
@@ -80,22 +78,15 @@ def _parser(description: str) -> argparse.ArgumentParser:
 
 def _import_all(modules: list[str]) -> dict[str, Any]:
     """Return the modules by their first names; one that is missing is reported."""
-    found: dict[str, Any] = {}
+    imported: dict[str, Any] = {}
     for name in modules:
         try:
-            found[name] = import_module(name)
+            imported[name] = import_module(name)
         except ImportError as error:
             sys.stderr.write(f"transform: cannot import module '{name}': {error}\n")
-    for name in [name for name in found if "." in name]:
-        found[name.partition(".")[0]] = import_module(name.partition(".")[0])
-    return found
-
-
-def _compile(parser: argparse.ArgumentParser, expression: str) -> Any:
-    try:
-        return compile(expression.strip(), "<expression>", "eval")
-    except SyntaxError as error:
-        parser.error(f"'{expression}' is not a Python expression: {error.msg}")
+    for name in [name for name in imported if "." in name]:
+        imported[name.partition(".")[0]] = import_module(name.partition(".")[0])
+    return imported
 
 
 def _evaluate(fields: Any, part: Any) -> Any:
@@ -105,7 +96,7 @@ def _evaluate(fields: Any, part: Any) -> Any:
     if not isinstance(fields, str):
         return fields
     try:
-        return eval(fields, {}, {"m": part})  # noqa: S307  # what the program is for
+        return eval(fields, {}, {"m": part})  # noqa: S307  # the purpose of the program
     except (NameError, SyntaxError):
         return fields
 
@@ -117,7 +108,7 @@ def _run(
     *,
     latch: bool = False,
 ) -> None:
-    """Publish what a function makes of the messages, or fields, of the input."""
+    """Publish the result of a function for each message, or field, of the input."""
     with Node(name, anonymous=True) as node:
         serve_loggers(node)
         try:
@@ -138,20 +129,10 @@ def _run(
 
 def _find(node: Node, name: str, *, wait: bool) -> Target:
     """Return the topic that a text names, and the field of its messages."""
-    head, bracket, rest = name.partition("[")
-    name = f"{node.resolve(head)}{bracket}{rest}"
-    graph, load = node.context.graph, node.context.types.message
-
-    def found(topics: Any) -> Target | None:
-        try:
-            return find_target(name, topics, load)
-        except NotFoundError:
-            if wait:
-                return None
-            raise
-
-    view = graph.refresh()
-    if wait and found(view.topics()) is None:
-        sys.stderr.write(f"WARNING: topic [{name}] does not appear to be published yet\n")
-        view = graph.wait_for(lambda view: found(view.topics()) is not None, _FOREVER, name)
-    return find_target(name, view.topics(), load)
+    context, name = node.context, resolve_field(name, node.resolve)
+    if wait:
+        text = f"WARNING: topic [{name}] does not appear to be published yet\n"
+        return wait_for_target(context, name, lambda _: sys.stderr.write(text))[0]
+    return context.graph.find(
+        lambda view: find_target(name, topic_types(view), context.types.message)
+    )

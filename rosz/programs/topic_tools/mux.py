@@ -1,46 +1,37 @@
 """The programs ``mux``, which passes one of several topics on, and ``demux``, its reverse.
 
-Their services lie below ``mux`` and ``demux``, names that users remap.
+Their services lie below ``mux`` and ``demux``, names that users remap. ``mux_select``, ``mux_add``,
+``demux_select`` and so on call these services.
 """
 
 from __future__ import annotations
 
 import sys
 import threading
+from pathlib import Path
 from typing import Any, Generic, NoReturn, TypeVar
 
-from rosz.errors import ServiceError
+from rosz.errors import RoszError, ServiceError
+from rosz.message import Service
 from rosz.msgs.std_msgs.msg import String
-from rosz.msgs.topic_tools.srv import (
-    DemuxAdd,
-    DemuxDelete,
-    DemuxList,
-    DemuxSelect,
-    MuxAdd,
-    MuxDelete,
-    MuxList,
-    MuxSelect,
-)
+from rosz.msgs.topic_tools import srv
 from rosz.node import MessageInfo, Node, serve_loggers
-from rosz.programs.topic_tools.passing import NONE, Input, Output, base_name, words
+from rosz.programs.topic_tools.passing import NONE, RawInput, RawOutput, base_name
+from rosz.remap import parse
 
-__all__ = ("Demux", "Mux", "demux", "mux")
+T = TypeVar("T", RawInput, RawOutput)
 
-T = TypeVar("T", Input, Output)
-
-_SERVICES = {
-    "mux": (MuxSelect, MuxAdd, MuxList, MuxDelete),
-    "demux": (DemuxSelect, DemuxAdd, DemuxList, DemuxDelete),
+_FOREVER = 1e9
+_VERBS = {
+    "add": ("TOPIC", 'Adding "{topic}" to {kind} "{name}"'),
+    "delete": ("TOPIC", 'Deleting "{topic}" from {kind} "{name}"'),
+    "list": ("", 'Listing topics from {kind} "{name}"'),
+    "select": ("TOPIC", 'Selecting "{topic}" at {kind} "{name}"'),
 }
 
 
-class _Choice(Generic[T]):
-    """Topics of which one or none is selected, and the services that change that.
-
-    Args:
-        node: The node.
-        kind: ``mux`` or ``demux``.
-    """
+class _TopicChoice(Generic[T]):
+    """Topics of which one or none is selected, and the services that change that."""
 
     def __init__(self, node: Node, kind: str) -> None:
         self._node = node
@@ -59,15 +50,17 @@ class _Choice(Generic[T]):
         first = next(iter(self._topics))
         initial = self._node.params.get("~initial_topic", "", type=str)
         if self._kind == "mux" and initial:
-            found = self._find(initial)
-            self._select(found, initial if found else NONE)
+            chosen = self._find(initial)
+            self._select(chosen, initial if chosen else NONE)
         else:
             self._select(self._topics[first], first)
-        select, add, listing, delete = _SERVICES[self._kind]
-        self._node.service(f"{self._own}/select", select, self._serve_select)
-        self._node.service(f"{self._own}/add", add, self._serve_add)
-        self._node.service(f"{self._own}/list", listing, lambda _: [list(self._topics)])
-        self._node.service(f"{self._own}/delete", delete, self._serve_delete)
+        for verb, serve in (
+            ("select", self._serve_select),
+            ("add", self._serve_add),
+            ("list", lambda _: [list(self._topics)]),
+            ("delete", self._serve_delete),
+        ):
+            self._node.service(f"{self._own}/{verb}", _service_type(self._kind, verb), serve)
 
     def _find(self, topic: str) -> T | None:
         return None if topic == NONE else self._topics.get(self._node.resolve(topic))
@@ -107,13 +100,13 @@ class _Choice(Generic[T]):
 
     def _serve_delete(self, request: Any) -> list[Any]:
         with self._lock:
-            found = self._find(request.topic)
-            if found is None:
+            deleted = self._find(request.topic)
+            if deleted is None:
                 self._refuse(f"it has no topic '{request.topic}'; it has {self._listing()}")
-            if found is self._selected:
+            if deleted is self._selected:
                 self._refuse(f"topic '{request.topic}' is selected; select another one first")
-            del self._topics[found.name]
-            found.close()
+            del self._topics[deleted.name]
+            deleted.close()
             self._node.log.info("deleted %s from %s", request.topic, self._kind)
             return []
 
@@ -125,35 +118,30 @@ class _Choice(Generic[T]):
         raise ServiceError(f"{self._kind}: {reason}")
 
 
-class Mux(_Choice[Input]):
-    """Pass on the selected one of several topics.
+class Mux(_TopicChoice[RawInput]):
+    """Pass on the selected one of several topics, at first the first one.
 
     Its private parameters are those of ROS 1: ``lazy`` subscribes to the selected topic alone, and
     only while the output has subscribers, ``latch``, and ``initial_topic``.
-
-    Args:
-        node: The node.
-        target: Name of the output.
-        sources: Names of the inputs; the first one is selected.
     """
 
     def __init__(self, node: Node, target: str, sources: list[str]) -> None:
         super().__init__(node, "mux")
         self._lazy = node.params.get("~lazy", False, type=bool)
         latch = node.params.get("~latch", False, type=bool)
-        self._output = Output(node, target, latch=latch, changed=self._follow)
+        self._output = RawOutput(node, target, latch=latch, changed=self._follow)
         with self._lock:
             self._begin(sources)
-        node.service(f"{self._output.name}_select", MuxSelect, self._serve_select)
+        node.service(f"{self._output.name}_select", srv.MuxSelect, self._serve_select)
 
-    def _make(self, topic: str) -> Input:
-        return Input(self._node, topic, self._receive)
+    def _make(self, topic: str) -> RawInput:
+        return RawInput(self._node, topic, self._receive)
 
     def _add(self, topic: str) -> None:
         super()._add(topic)
         self._follow()
 
-    def _select(self, chosen: Input | None, shown: str) -> None:
+    def _select(self, chosen: RawInput | None, shown: str) -> None:
         super()._select(chosen, shown)
         self._follow()
 
@@ -167,7 +155,7 @@ class Mux(_Choice[Input]):
                 else:
                     topic.open()
 
-    def _receive(self, data: bytes, info: MessageInfo, source: Input) -> None:
+    def _receive(self, data: bytes, info: MessageInfo, source: RawInput) -> None:
         if not self._output.advertised:
             self._output.advertise(info, source)
             self._follow()
@@ -175,25 +163,19 @@ class Mux(_Choice[Input]):
             self._output.publish(data, info, source)
 
 
-class Demux(_Choice[Output]):
-    """Pass a topic on to the selected one of several.
-
-    Args:
-        node: The node.
-        source: Name of the input.
-        targets: Names of the outputs; the first one is selected.
-    """
+class Demux(_TopicChoice[RawOutput]):
+    """Pass a topic on to the selected one of several, at first the first one."""
 
     def __init__(self, node: Node, source: str, targets: list[str]) -> None:
         super().__init__(node, "demux")
         with self._lock:
             self._begin(targets)
-        Input(node, source, self._receive).open()
+        RawInput(node, source, self._receive).open()
 
-    def _make(self, topic: str) -> Output:
-        return Output(self._node, topic, latch=False)
+    def _make(self, topic: str) -> RawOutput:
+        return RawOutput(self._node, topic, latch=False)
 
-    def _receive(self, data: bytes, info: MessageInfo, source: Input) -> None:
+    def _receive(self, data: bytes, info: MessageInfo, source: RawInput) -> None:
         with self._lock:
             outputs, selected = list(self._topics.values()), self._selected
         # All are announced, so that subscribers of those selected later are connected by then.
@@ -205,21 +187,54 @@ class Demux(_Choice[Output]):
 
 def mux() -> None:
     """Pass on the selected one of several topics."""
-    given = words()
-    if len(given) < 2:  # noqa: PLR2004
-        sys.exit("usage: mux OUT_TOPIC IN_TOPIC1 [IN_TOPIC2 ...]")
-    with Node(f"{base_name(given[0])}_mux", anonymous=True) as node:
-        serve_loggers(node)
-        Mux(node, given[0], given[1:])
-        node.spin()
+    _run(Mux, "mux OUT_TOPIC IN_TOPIC1 [IN_TOPIC2 ...]")
 
 
 def demux() -> None:
     """Pass a topic on to the selected one of several."""
-    given = words()
+    _run(Demux, "demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 ...]")
+
+
+def _run(kind: type[Mux | Demux], usage: str) -> None:
+    given = list(parse(sys.argv[1:]).rest)
     if len(given) < 2:  # noqa: PLR2004
-        sys.exit("usage: demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 ...]")
-    with Node(f"{base_name(given[0])}_demux", anonymous=True) as node:
+        sys.exit(f"usage: {usage}")
+    with Node(f"{base_name(given[0])}_{kind.__name__.lower()}", anonymous=True) as node:
         serve_loggers(node)
-        Demux(node, given[0], given[1:])
+        kind(node, given[0], given[1:])
         node.spin()
+
+
+def call_service() -> None:
+    """Call the service that the name of the program tells."""
+    program = Path(sys.argv[0]).name
+    kind, _, verb = program.partition("_")
+    argument, doing = _VERBS[verb]
+    given = list(parse(sys.argv[1:]).rest)
+    if len(given) != 1 + bool(argument):
+        sys.exit(f"usage: {program} {kind.upper()}_NAME {argument}".rstrip())
+    name, *topic = given
+    with Node(program, anonymous=True) as node:
+        client = node.client(f"{name}/{verb}", _service_type(kind, verb))
+        _say(f'Waiting for service "{name}/{verb}"')
+        try:
+            client.wait_for_service(_FOREVER)
+            _say(doing.format(topic="".join(topic), kind=kind, name=name))
+            response = client(*topic)
+        except RoszError as error:
+            if node.is_shutdown:
+                return
+            sys.exit(f"{program}: {error}")
+        if verb == "list":
+            _say(str(list(response.topics)))
+
+
+def _service_type(kind: str, verb: str) -> type[Service]:
+    """Return the type of a service, such as that of ``select`` of a ``mux``."""
+    service: type[Service] = getattr(srv, f"{kind.title()}{verb.title()}")
+    return service
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()

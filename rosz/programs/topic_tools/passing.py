@@ -1,7 +1,7 @@
 """Topics of any type: an input that is received as bytes, and an output that sends such bytes.
 
-What an output is, its type and whether it latches, follows from the first message that it sends, as
-in ROS 1. No definition of the type is needed.
+The first message that an output sends decides its type and whether it latches, as in ROS 1.
+No definition of the type is needed.
 """
 
 from __future__ import annotations
@@ -14,26 +14,19 @@ from typing import Any
 from rosz import names
 from rosz.errors import InvalidName
 from rosz.message import Message
-from rosz.node import MessageInfo, Node, Publisher, Subscription
+from rosz.node import GenericSubscription, MessageInfo, Node, Publisher, Subscription
 from rosz.qos import QoS
-
-__all__ = ("NONE", "Input", "Output", "base_name", "words")
 
 NONE = "__none"
 """The name that stands for no topic in a mux and a demux."""
 
-_DEPTH = 10
+_DEPTH = 10  # as in ROS 1's topic_tools
 
-Receive = Callable[[bytes, MessageInfo, "Input"], object]
-
-
-def words() -> list[str]:
-    """Return the command line of the program without its name, remappings and parameters."""
-    return [word for word in sys.argv[1:] if ":=" not in word]
+Receive = Callable[[bytes, MessageInfo, "RawInput"], object]
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of the name of a topic, which is part of the name of a node.
+    """Return the last part of a topic's name, for the name of a node.
 
     Ends the program if the text is not the name of a topic.
     """
@@ -44,17 +37,12 @@ def base_name(topic: str) -> str:
     return names.basename(topic).strip("~/") or "root"
 
 
-class Input:
+class RawInput:
     """A topic that is received while it is open.
 
     Args:
-        node: The node.
-        topic: Name of the topic.
         receive: Function that gets the bytes of a message, its info, and this input.
         unreliable: Whether samples may be lost, which a slow link then does not delay.
-
-    Attributes:
-        name: Global name of the topic.
     """
 
     def __init__(
@@ -66,11 +54,6 @@ class Input:
         self._qos = QoS(_DEPTH, "best_effort" if unreliable else "reliable")
         self._lock = threading.Lock()
         self._subscription: Subscription[Any] | None = None
-
-    @property
-    def is_open(self) -> bool:
-        """Whether messages are received."""
-        return self._subscription is not None
 
     def is_latched(self, info: MessageInfo) -> bool:
         """Return whether the publishers of a type latch their messages."""
@@ -86,13 +69,16 @@ class Input:
         """Subscribe; a second call has no effect."""
         with self._lock:
             if self._subscription is None:
-                self._subscription = self._node.subscription(
-                    self.name,
-                    None,
-                    lambda data, info: self._receive(data, info, self),
-                    qos=self._qos,
-                    raw=True,
-                    with_info=True,
+                # Not by `Node.subscription`, where this QoS would ask for no latched messages.
+                self._subscription = self._node.keep(
+                    GenericSubscription(
+                        self._node,
+                        self.name,
+                        lambda data, info: self._receive(data, info, self),
+                        self._qos,
+                        raw=True,
+                        with_info=True,
+                    )
                 )
 
     def close(self) -> None:
@@ -103,17 +89,12 @@ class Input:
             closing.close()
 
 
-class Output:
+class RawOutput:
     """A topic to send to.
 
     Args:
-        node: The node.
-        topic: Name of the topic.
         latch: Whether late subscribers get the last message; as the input does when None.
         changed: Function called whenever a subscriber has come or gone.
-
-    Attributes:
-        name: Global name of the topic.
     """
 
     def __init__(
@@ -142,7 +123,7 @@ class Output:
         """Whether anybody subscribes to it."""
         return self._publisher is not None and bool(self._publisher.subscribers())
 
-    def advertise(self, info: MessageInfo, source: Input) -> None:
+    def advertise(self, info: MessageInfo, source: RawInput) -> None:
         """Announce the topic with the type of a message; a second call has no effect."""
         with self._lock:
             if self._publisher is not None:
@@ -154,11 +135,8 @@ class Output:
             )
         self._node.log.info("advertised as %s", self.name)
         if self._changed is not None:
-            made.on_connection(lambda _: self._notify(), lambda _: self._notify())
-
-    def _notify(self) -> None:
-        if self._changed is not None:
-            self._changed()
+            changed = self._changed
+            made.on_connection(lambda _: changed(), lambda _: changed())
 
     def close(self) -> None:
         """Take the topic back; a second call has no effect."""
@@ -167,7 +145,7 @@ class Output:
         if closing is not None:
             closing.close()
 
-    def publish(self, data: bytes, info: MessageInfo, source: Input) -> None:
+    def publish(self, data: bytes, info: MessageInfo, source: RawInput) -> None:
         """Send a message; one of another type than the first is reported once and dropped."""
         self.advertise(info, source)
         publisher = self._publisher
@@ -187,7 +165,7 @@ class Output:
 
 
 def _message_type(info: MessageInfo) -> type[Message]:
-    """Return what a publisher needs to know of a type, which may have no definition here."""
+    """Return a class with the names of a type for a publisher; it needs no definition."""
     package, _, name = info.type_name.split("/")
     fields = {
         "_type": f"{package}/{name}",

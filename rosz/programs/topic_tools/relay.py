@@ -11,10 +11,9 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from rosz.node import MessageInfo, Node, TimerEvent, serve_loggers
-from rosz.programs.topic_tools.passing import Input, Output, base_name, words
+from rosz.programs.topic_tools.passing import RawInput, RawOutput, base_name
+from rosz.remap import parse
 from rosz.wire import Kind
-
-__all__ = ("ByteLimit", "PeriodLimit", "Relay", "Share", "drop", "relay", "throttle")
 
 _CDR_HEADER = 4
 _NANOSECONDS = 1_000_000_000
@@ -37,9 +36,7 @@ Accept = Callable[[bytes], bool]
 class PeriodLimit:
     """Accept a message if a period has passed since the last one that was accepted.
 
-    Args:
-        rate: Messages per second.
-        now: Function that returns the time in nanoseconds.
+    The rate is in messages per second, and the clock in nanoseconds.
     """
 
     def __init__(self, rate: float, now: Callable[[], int]) -> None:
@@ -64,7 +61,6 @@ class ByteLimit:
     Args:
         size: Number of bytes per window from which on messages are refused.
         window: The window in seconds.
-        now: Function that returns the time in nanoseconds.
     """
 
     def __init__(self, size: int, window: float, now: Callable[[], int]) -> None:
@@ -85,12 +81,7 @@ class ByteLimit:
 
 
 class Share:
-    """Refuse the first messages of each group.
-
-    Args:
-        refused: Number of messages to refuse.
-        size: Number of messages in a group.
-    """
+    """Refuse the first messages of each group of a size."""
 
     def __init__(self, refused: int, size: int) -> None:
         self._refused = refused
@@ -104,18 +95,14 @@ class Share:
         return accepted
 
 
-class Relay:
-    """Pass a topic on.
+class RelayedTopic:
+    """Pass a topic on, except messages that ``accept`` refuses.
 
     Its private parameters are those of ROS 1: ``lazy`` subscribes only while the output has
     subscribers, ``unreliable``, and for ``relay`` ``stealth``, which subscribes only while others
     subscribe to ``monitor_topic``, looked at each ``monitor_rate`` seconds.
 
     Args:
-        node: The node.
-        source: Name of the input.
-        target: Name of the output.
-        accept: Function that decides on each message; all are passed on when None.
         latch: Whether the output latches; as the input does when None.
     """
 
@@ -135,8 +122,8 @@ class Relay:
         self._lazy = params.get("~lazy", False, type=bool)
         self._stealth = params.get("~stealth", False, type=bool)
         unreliable = params.get("~unreliable", False, type=bool)
-        self._input = Input(node, source, self._receive, unreliable=unreliable)
-        self._output = Output(node, target, latch=latch, changed=self._changed)
+        self._input = RawInput(node, source, self._receive, unreliable=unreliable)
+        self._output = RawOutput(node, target, latch=latch, changed=self._changed)
         if self._input.name == self._output.name:
             sys.exit(f"relay: the input and the output are both '{self._input.name}'")
         if self._stealth:
@@ -146,7 +133,7 @@ class Relay:
             node.timer(params.get("~monitor_rate", 1.0, type=float), self._monitor)
         self._input.open()
 
-    def _receive(self, data: bytes, info: MessageInfo, source: Input) -> None:
+    def _receive(self, data: bytes, info: MessageInfo, source: RawInput) -> None:
         self._output.advertise(info, source)
         if self._stealth and not self._output.subscribed:
             source.close()
@@ -177,25 +164,25 @@ class Relay:
 
 def relay() -> None:
     """Pass a topic on under another name."""
-    given = words()
+    given = list(parse(sys.argv[1:]).rest)
     if len(given) not in {1, 2}:
         sys.exit(_RELAY_USAGE)
     with Node(f"{base_name(given[0])}_relay", anonymous=True) as node:
         serve_loggers(node)
-        Relay(node, given[0], given[1] if given[1:] else f"{given[0]}_relay")
+        RelayedTopic(node, given[0], given[1] if given[1:] else f"{given[0]}_relay")
         node.spin()
 
 
 def drop() -> None:
     """Pass on some of every few messages."""
-    given = words()
+    given = list(parse(sys.argv[1:]).rest)
     if len(given) not in {3, 4}:
         sys.exit(_DROP_USAGE)
     source, refused, size = given[0], int(_number(given[1], 0)), int(_number(given[2], 1))
     with Node(f"{base_name(source)}_drop", anonymous=True) as node:
         serve_loggers(node)
         target = given[3] if given[3:] else f"{source}_drop"
-        Relay(node, source, target, Share(refused, size), latch=False)
+        RelayedTopic(node, source, target, Share(refused, size), latch=False)
         node.spin()
 
 
@@ -205,7 +192,7 @@ def throttle() -> None:
     The private parameter ``wall_clock`` makes the clock of the machine count in place of ROS time,
     and ``force_latch`` decides whether the output latches.
     """
-    kind, *given = words() or [""]
+    kind, *given = list(parse(sys.argv[1:]).rest) or [""]
     limits = {"messages": 1, "bytes": 2}.get(kind, 0)
     if not limits or len(given) - limits not in {1, 2}:
         sys.exit(_THROTTLE_USAGE)
@@ -222,7 +209,7 @@ def throttle() -> None:
             accept = ByteLimit(int(rate), window[0], now)
         latch = node.params.get("~force_latch", None)
         target = given[-1] if len(given) == 2 + limits else f"{source}_throttle"
-        Relay(node, source, target, accept, latch=None if latch is None else bool(latch))
+        RelayedTopic(node, source, target, accept, latch=None if latch is None else bool(latch))
         node.spin()
 
 

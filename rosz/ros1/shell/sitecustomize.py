@@ -5,26 +5,46 @@ loaded when a module is imported that no other finder has. If the interpreter do
 such a module stays unknown.
 """
 
-from __future__ import annotations
-
+# Only what Python has loaded by now, as Ctrl-C may come during an import: not even __future__.
+import _signal as signal  # type: ignore[import-not-found]  # it has no stubs
 import sys
-from collections.abc import Iterator, Sequence
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder
-from importlib.util import module_from_spec
-from pathlib import Path
-from types import FrameType, ModuleType
 
-__all__ = ()
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from importlib.machinery import ModuleSpec
+    from types import FrameType, ModuleType
 
 _NEEDED = sys.stdlib_module_names | {"msgspec", "rosz", "yaml", "zenoh"}
 """Modules that rosz itself needs."""
 
 
-class _Last(MetaPathFinder):
+class _Silence:
+    """A context in which Ctrl-C ends the process at once, without a traceback.
+
+    Python calls it a fatal error if this module fails.
+    """
+
+    def __enter__(self) -> None:
+        """Replace Python's own handler, unless there is another one."""
+        self._set(signal.default_int_handler, signal.SIG_DFL)
+
+    def __exit__(self, *_: object) -> None:
+        """Set it again."""
+        self._set(signal.SIG_DFL, signal.default_int_handler)
+
+    def _set(self, before: object, after: object) -> None:
+        if signal.getsignal(signal.SIGINT) is before:
+            try:
+                signal.signal(signal.SIGINT, after)
+            except ValueError:  # not the main thread
+                return
+
+
+class _Last:
     def find_spec(
-        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
+        self, fullname: str, path: "Sequence[str] | None", target: "ModuleType | None" = None
+    ) -> "ModuleSpec | None":
         """Install rosz's finders, and find the module with them.
 
         Do nothing while a module that rosz needs is being loaded: such a module tries to import
@@ -33,18 +53,22 @@ class _Last(MetaPathFinder):
         if path is not None or not _NEEDED.isdisjoint(_loading()):
             return None
         sys.meta_path.remove(self)
-        known = len(sys.meta_path)
+        before = len(sys.meta_path)
         try:
-            from rosz.ros1.importer import install
+            with _Silence():
+                from rosz.interrupts import InterruptDeferral
+            with InterruptDeferral():
+                from rosz.ros1.importer import install
+
+                install()
         except ImportError:
             return None
-        install()
-        added = [*sys.meta_path[: len(sys.meta_path) - known], *sys.meta_path[-1:]]
-        found = (finder.find_spec(fullname, path, target) for finder in added)
-        return next((spec for spec in found if spec is not None), None)
+        added = [*sys.meta_path[: len(sys.meta_path) - before], *sys.meta_path[-1:]]
+        specs = (finder.find_spec(fullname, path, target) for finder in added)
+        return next((spec for spec in specs if spec is not None), None)
 
 
-def _loading() -> Iterator[str]:
+def _loading() -> "Iterator[str]":
     """Yield the packages that this thread is loading."""
     frame: FrameType | None = sys._getframe()  # noqa: SLF001  # the public ways load modules
     while frame is not None:
@@ -55,12 +79,21 @@ def _loading() -> Iterator[str]:
 
 def _run_next() -> None:
     """Run the ``sitecustomize`` that Python would find without this one."""
-    here = Path(__file__).resolve().parent
-    others = [folder for folder in sys.path if Path(folder).resolve() != here]
+    from importlib.machinery import PathFinder
+    from os.path import realpath, split
+
+    here = realpath(split(__file__)[0])
+    others = [folder for folder in sys.path if realpath(folder) != here]
     spec = PathFinder.find_spec("sitecustomize", others)
     if spec is not None and spec.loader is not None:
-        spec.loader.exec_module(module_from_spec(spec))
+        module = type(sys)("sitecustomize")
+        module.__file__, module.__spec__ = spec.origin, spec
+        spec.loader.exec_module(module)
 
 
-sys.meta_path.append(_Last())
-_run_next()
+_silence = _Silence()
+with _silence:
+    sys.meta_path.append(_Last())
+    _run_next()
+if sys.orig_argv[1:4] == ["-P", "-m", "rosz"]:  # a command, which wants it so from its start
+    _silence.__enter__()

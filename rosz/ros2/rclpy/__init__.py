@@ -12,11 +12,10 @@ from rosz.ros2.rclpy import executors as task
 from rosz.ros2.rclpy import program as utilities
 from rosz.ros2.rclpy import time as clock
 from rosz.ros2.rclpy import time as duration
-from rosz.ros2.rclpy.executors import Future
+from rosz.ros2.rclpy.context import get_default_context
+from rosz.ros2.rclpy.executors import Future, get_global_executor
 from rosz.ros2.rclpy.program import (
     create_node,
-    get_default_context,
-    get_global_executor,
     init,
     ok,
     shutdown,

@@ -10,19 +10,16 @@ import uuid
 from collections import deque
 from collections.abc import Callable
 from enum import Enum
-from typing import Any, TypeVar
+from typing import Any
 
-from rosz.errors import GoalFailed, GoalRejected, RoszError, UsageError, WaitTimeout
-from rosz.introspect.actions import list_actions
+from rosz import actions
+from rosz.actions import ClientGoal, GoalState, ServerGoal
+from rosz.errors import GoalFailed, GoalRejected, UsageError, WaitTimeout
 from rosz.msgs.action_msgs.msg import GoalInfo, GoalStatus
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
-from rosz.node.action_client import ActionClient as RoszActionClient
-from rosz.node.action_client import ClientGoal
-from rosz.node.action_server import ActionServer as RoszActionServer
-from rosz.node.action_server import ServerGoal
-from rosz.node.goals import GoalState
-from rosz.ros2.rclpy.executors import CallbackGroup, Future
+from rosz.ros2.rclpy.executors import CallbackGroup, Future, completed, in_background
+from rosz.session import LONGEST_WAIT
 
 __all__ = (
     "ActionClient",
@@ -35,8 +32,6 @@ __all__ = (
     "get_action_names_and_types",
 )
 
-T = TypeVar("T")
-_FOREVER = threading.TIMEOUT_MAX / 2
 _CHECK_PERIOD = 0.5
 """Seconds after which a goal that waits for an executor checks whether the node has ended."""
 
@@ -106,7 +101,7 @@ class ServerGoalHandle:
         self._goal.feedback(feedback)
 
     def succeed(self) -> None:
-        """Mark the goal as reached; its result is what the callback returns.
+        """Mark the goal as reached; the callback returns its result.
 
         Raises:
             UsageError: The goal has ended before.
@@ -130,12 +125,12 @@ class ServerGoalHandle:
 
     def finish(self, result: Any) -> None:
         """Send the result; for the server."""
-        ends = {
-            GoalState.SUCCEEDED: self._goal.succeed,
-            GoalState.CANCELED: self._goal.canceled,
-        }
-        end = self._goal.abort if self._outcome is None else ends.get(self._outcome)
-        (end or self._goal.abort)(result)
+        if self._outcome is GoalState.SUCCEEDED:
+            self._goal.succeed(result)
+        elif self._outcome is GoalState.CANCELED:
+            self._goal.canceled(result)
+        else:
+            self._goal.abort(result)
 
     def destroy(self) -> None:
         """Do nothing: the server forgets a goal in time."""
@@ -158,10 +153,6 @@ class ActionServer:
             `CancelResponse`; by default no goal is cancelled.
         result_timeout: Seconds for which results are kept.
         options: Profiles of quality of service, which are ignored.
-
-    Attributes:
-        action_type: As given.
-        callback_group: As given.
     """
 
     def __init__(
@@ -188,7 +179,7 @@ class ActionServer:
         self.register_goal_callback(goal_callback)
         self.register_handle_accepted_callback(handle_accepted_callback)
         self.register_cancel_callback(cancel_callback)
-        self._server: RoszActionServer = node.rosz_node.action_server(
+        self._server: actions.ActionServer = node.rosz_node.action_server(
             action_name,
             action_type,
             self._run,
@@ -229,14 +220,13 @@ class ActionServer:
         return self._ask(self._on_cancel, handle) is CancelResponse.ACCEPT
 
     def _ask(self, callback: Callable[[Any], Any], value: Any) -> Any:
-        """Return what a callback returns, which the executor calls."""
+        """Let the executor call a callback, and return its answer."""
         answers: list[Any] = []
         finished = threading.Event()
 
         async def call() -> None:
             try:
-                answer = callback(value)
-                answers.append(await answer if hasattr(answer, "__await__") else answer)
+                answers.append(await completed(callback(value)))
             finally:
                 finished.set()
 
@@ -268,8 +258,7 @@ class ActionServer:
         async def call() -> None:
             result: Any = None
             try:
-                returned = execute(handle)
-                result = await returned if hasattr(returned, "__await__") else returned
+                result = await completed(execute(handle))
             except Exception as error:  # noqa: BLE001  # the callback boundary, as in rclpy
                 self._node.rosz_node.log.report("the execute callback of an action failed", error)
             finally:
@@ -334,7 +323,7 @@ class ClientGoalHandle:
 
     def cancel_goal(self) -> Any:
         """Ask the server to cancel the goal, and return its response."""
-        return self._client.native.request_cancel(GoalInfo(self.goal_id), _FOREVER)
+        return self._client.native.request_cancel(GoalInfo(self.goal_id), LONGEST_WAIT)
 
     def _followed(self) -> ClientGoal:
         if self._goal is None:
@@ -359,7 +348,7 @@ class ActionClient:
         del options
         self._node = node
         self._action_type = action_type
-        self.native: RoszActionClient = node.rosz_node.action_client(action_name, action_type)
+        self.native: actions.ActionClient = node.rosz_node.action_client(action_name, action_type)
         node.rosz_add(self)
 
     def server_is_ready(self) -> bool:
@@ -367,16 +356,13 @@ class ActionClient:
         return self.native.is_served()
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until a node serves the action.
+        """Wait until a node serves the action; return whether one does.
 
         Args:
             timeout_sec: Time limit in seconds; none when not given.
-
-        Returns:
-            Whether a node serves it.
         """
         try:
-            self.native.wait_for_server(_FOREVER if timeout_sec is None else timeout_sec)
+            self.native.wait_for_server(LONGEST_WAIT if timeout_sec is None else timeout_sec)
         except WaitTimeout:
             return False
         return True
@@ -400,7 +386,7 @@ class ActionClient:
         self._check(goal)
 
         def send() -> ClientGoalHandle:
-            self.native.wait_for_server(_FOREVER)
+            self.native.wait_for_server(LONGEST_WAIT)
             return self._send(goal, feedback_callback, goal_uuid)
 
         return self.in_background(send)
@@ -438,7 +424,7 @@ class ActionClient:
                 self._node.rosz_call_soon(lambda: callback(message))
 
         try:
-            sent = self.native.send(goal, feedback=receive, timeout=_FOREVER, goal_id=goal_id)
+            sent = self.native.send(goal, feedback=receive, timeout=LONGEST_WAIT, goal_id=goal_id)
         except GoalRejected:
             return ClientGoalHandle(self, goal_id, None)
         return ClientGoalHandle(self, goal_id, sent)
@@ -451,23 +437,9 @@ class ActionClient:
             result = error.result
         return self._action_type.GetResult.Response(int(goal.status), result)
 
-    def in_background(self, function: Callable[[], T]) -> Future:
-        """Return a future of what a function returns that waits."""
-        future = Future()
-
-        def call() -> None:
-            try:
-                result = function()
-            except RoszError as error:
-                failure = error
-                self._node.rosz_call_soon(lambda: future.set_exception(failure))
-            else:
-                self._node.rosz_call_soon(lambda: future.set_result(result))
-
-        # Not a `Worker`, which is bounded: any number of goals may wait, each without a limit.
-        name = f"rosz-call{self.native.name}"
-        threading.Thread(target=call, name=name, daemon=True).start()
-        return future
+    def in_background(self, function: Callable[[], Any]) -> Future:
+        """Return a future of the result of a function that waits."""
+        return in_background(f"rosz-call{self.native.name}", function, self._node.rosz_call_soon)
 
     def destroy(self) -> None:
         """Close the client."""
@@ -478,4 +450,4 @@ class ActionClient:
 def get_action_names_and_types(node: Any) -> list[tuple[str, list[str]]]:
     """Return the actions that are served or used, with their types."""
     view = node.rosz_node.context.graph.view()
-    return [(one.name, list(one.types)) for one in list_actions(view)]
+    return [(entry.name, list(entry.types)) for entry in actions.list_actions(view)]

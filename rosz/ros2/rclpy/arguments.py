@@ -17,8 +17,6 @@ from rosz.params.ros2_file import sections
 from rosz.params.yaml import read_plain
 from rosz.remap import Arguments
 
-__all__ = ("RosArguments", "parse", "remove_ros_args")
-
 _BEGIN, _END = "--ros-args", "--"
 _FLAGS = frozenset({
     "--enable-rosout-logs", "--disable-rosout-logs", "--enable-stdout-logs",
@@ -73,7 +71,11 @@ def parse(args: Sequence[str]) -> RosArguments:
     level = ""
     for option, value in _options(args):
         if option in {"-r", "--remap"}:
-            _remap(value, remaps, special)
+            _, name, target = _split(value)
+            if name in {"__node", "__name", "__ns"}:
+                special["__ns" if name == "__ns" else "__name"] = target
+            else:
+                remaps[name] = target
         elif option in {"-p", "--param"}:
             node, name, text = _split(value)
             params.setdefault(node, {})[name] = _value(text, value)
@@ -111,16 +113,6 @@ def _split(rule: str) -> tuple[str, str, str]:
     if not separator or not (name if colon else node):
         raise UsageError(f"'{rule}' is not a rule; expected name:=value")
     return (node, name, right) if colon else ("", node, right)
-
-
-def _remap(rule: str, remaps: dict[str, str], special: dict[str, str]) -> None:
-    _, name, target = _split(rule)
-    if name in {"__node", "__name"}:
-        special["__name"] = target
-    elif name == "__ns":
-        special["__ns"] = target
-    else:
-        remaps[name] = target
 
 
 def _value(text: str, rule: str) -> Any:

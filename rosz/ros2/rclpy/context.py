@@ -1,4 +1,4 @@
-"""rclpy.context: what the nodes of a program share, from ``init`` to ``shutdown``."""
+"""rclpy.context: the connection that nodes of a program share from ``init`` to ``shutdown``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Self
+from types import FrameType
+from typing import Any, Self
 
 import msgspec
 
@@ -17,9 +18,6 @@ from rosz.node import Context as RoszContext
 from rosz.program import own
 from rosz.ros2.rclpy import arguments
 from rosz.ros2.rclpy.exceptions import NotInitializedException
-
-if TYPE_CHECKING:
-    from types import FrameType
 
 __all__ = ("Context", "get_default_context")
 
@@ -38,11 +36,7 @@ class Context:
         self.ended_by_signal: bool = False
 
     def init(self, args: Sequence[str] | None = None, *, domain_id: int | None = None) -> None:
-        """Connect to the network.
-
-        Args:
-            args: Command line with the program name; that of the process when not given.
-            domain_id: ROS domain; by the environment when not given.
+        """Connect to the network; see `rclpy.init`.
 
         Raises:
             UsageError: The context is open already, or the command line is not valid.
@@ -63,22 +57,14 @@ class Context:
 
     @property
     def given(self) -> arguments.RosArguments:
-        """The arguments of the command line.
-
-        Raises:
-            NotInitializedException: `init` was not called.
-        """
+        """The arguments of the command line; a NotInitializedException before `init`."""
         if self._given is None:
             raise NotInitializedException
         return self._given
 
     @property
     def opened(self) -> RoszContext:
-        """The context of rosz's own nodes.
-
-        Raises:
-            NotInitializedException: `init` was not called, or the context is shut down.
-        """
+        """The context of rosz's own nodes; a NotInitializedException unless `ok`."""
         if self._open is None or self._open.is_shutdown:
             raise NotInitializedException
         return self._open

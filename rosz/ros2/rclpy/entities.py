@@ -5,25 +5,21 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rosz.errors import RoszError, ServiceError, WaitTimeout
+from rosz.errors import ServiceError, WaitTimeout
+from rosz.message import Message
+from rosz.message import Service as ServiceType
 from rosz.node import Clock as RoszClock
 from rosz.node import Node as RoszNode
 from rosz.node import Publisher as RoszPublisher
 from rosz.node import Subscription as RoszSubscription
 from rosz.node import Timer as RoszTimer
 from rosz.qos import QoS
-from rosz.ros2.rclpy.executors import CallbackGroup, Future
-from rosz.ros2.rclpy.time import Clock, Rate
+from rosz.ros2.rclpy.executors import CallbackGroup, Future, completed, in_background
+from rosz.ros2.rclpy.time import Clock
+from rosz.session import LONGEST_WAIT
 
-if TYPE_CHECKING:
-    from rosz.message import Message
-    from rosz.message import Service as ServiceType
-
-__all__ = ("Client", "Publisher", "Rate", "Service", "Subscription", "Timer")
-
-_FOREVER = threading.TIMEOUT_MAX / 2
 _CHECK_PERIOD = 0.5
 """Seconds after which a waiting service call checks whether the node has ended."""
 
@@ -180,8 +176,7 @@ class Service:
 
     async def _respond(self, call: _Call) -> None:
         try:
-            result = self.callback(call.request, self.srv_type.Response())
-            call.response = await result if hasattr(result, "__await__") else result
+            call.response = await completed(self.callback(call.request, self.srv_type.Response()))
         except BaseException as error:
             call.error = error
             raise
@@ -194,14 +189,7 @@ class Service:
 
 
 class Client:
-    """Call a service; made by ``Node.create_client``.
-
-    Args:
-        node: Node that the client belongs to.
-        srv_name: Name of the service.
-        srv_type: Type of the service.
-        call_soon: Function that passes a function to the executor that spins the node.
-    """
+    """Call a service; made by ``Node.create_client``."""
 
     def __init__(
         self,
@@ -212,7 +200,7 @@ class Client:
         call_soon: Callable[[Callable[[], object]], None],
     ) -> None:
         self.srv_type: type[Any] = srv_type
-        self._client = node.client(srv_name, srv_type, timeout=_FOREVER)
+        self._client = node.client(srv_name, srv_type, timeout=LONGEST_WAIT)
         self._call_soon = call_soon
 
     @property
@@ -246,21 +234,12 @@ class Client:
         Returns:
             A future that is done, while the node is spun, when the response has come.
         """
-        future = Future()
 
-        def call() -> None:
-            try:
-                self._client.wait_for_service(_FOREVER)
-                response = self._client.call(request)
-            except RoszError as error:
-                failure = error
-                self._call_soon(lambda: future.set_exception(failure))
-            else:
-                self._call_soon(lambda: future.set_result(response))
+        def call() -> Any:
+            self._client.wait_for_service(LONGEST_WAIT)
+            return self._client.call(request)
 
-        # Not a `Worker`, which is bounded: any number of calls may wait, each without a limit.
-        threading.Thread(target=call, name=f"rosz-call{self.srv_name}", daemon=True).start()
-        return future
+        return in_background(f"rosz-call{self.srv_name}", call, self._call_soon)
 
     def remove_pending_request(self, future: Future) -> None:
         """Cancel a call; a response that comes later is ignored."""
@@ -271,16 +250,13 @@ class Client:
         return self._client.served
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until a node serves the service.
+        """Wait until a node serves the service; return whether one does.
 
         Args:
             timeout_sec: Time limit in seconds; none when not given.
-
-        Returns:
-            Whether a node serves it.
         """
         try:
-            self._client.wait_for_service(_FOREVER if timeout_sec is None else timeout_sec)
+            self._client.wait_for_service(LONGEST_WAIT if timeout_sec is None else timeout_sec)
         except WaitTimeout:
             return False
         return True

@@ -32,7 +32,9 @@ __all__ = (
     "SingleThreadedExecutor",
     "Task",
     "TimeoutException",
+    "completed",
     "get_global_executor",
+    "in_background",
 )
 
 Job = Callable[[], object]
@@ -263,7 +265,7 @@ class Executor:
 
     def remove_node(self, node: Any) -> None:
         """Stop running the callbacks of a node."""
-        self._nodes = [one for one in self._nodes if one is not node]
+        self._nodes = [other for other in self._nodes if other is not node]
         if node.executor is self:
             node.executor = None
 
@@ -340,9 +342,9 @@ class Executor:
         deadline = _deadline(timeout)
         while self.context.ok() and not self._is_shutdown and not finished():
             self._wakeup.clear()
-            found = self._next()
-            if found is not None:
-                self._run(*found)
+            ready = self._next()
+            if ready is not None:
+                self._run(*ready)
                 return
             left = None if deadline is None else deadline - time.monotonic()
             if left is not None and left <= 0:
@@ -443,6 +445,34 @@ class MultiThreadedExecutor(Executor):
     def _raise_failure(self) -> None:
         if self._failed:
             raise self._failed.popleft()
+
+
+async def completed(value: Any) -> Any:
+    """Return a value; a coroutine or future is awaited for its result."""
+    return await value if hasattr(value, "__await__") else value
+
+
+def in_background(
+    name: str, function: Callable[[], Any], call_soon: Callable[[Job], None]
+) -> Future:
+    """Call a function that waits on a thread of its own, and return a future of its result.
+
+    ``call_soon`` passes a function to the executor, which completes the future.
+    """
+    future = Future()
+
+    def call() -> None:
+        try:
+            result = function()
+        except RoszError as error:
+            failure = error
+            call_soon(lambda: future.set_exception(failure))
+        else:
+            call_soon(lambda: future.set_result(result))
+
+    # Not a `Worker`, which is bounded: any number of calls may wait, each without a limit.
+    threading.Thread(target=call, name=name, daemon=True).start()
+    return future
 
 
 _global = SingleThreadedExecutor()

@@ -172,12 +172,7 @@ class _Console(LogHandler):
 
 
 def write_as_rclpy(log: NodeLog, name: str) -> None:
-    """Write the log of a node to the console in rclpy's format.
-
-    Args:
-        log: Log of the node.
-        name: Name of the logger.
-    """
+    """Write the log of a node to the console in rclpy's format, under a name."""
     for handler in list(log.handlers):
         if isinstance(handler, ConsoleHandler):
             log.removeHandler(handler)

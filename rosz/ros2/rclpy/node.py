@@ -73,7 +73,7 @@ class Node(NodeParameters):
         overrides: dict[str, Any] = {}
         for name in ("", node.base_name, node.name):
             overrides |= given.params.get(name, {})
-        overrides |= {one.name: one.value for one in parameter_overrides or ()}
+        overrides |= {parameter.name: parameter.value for parameter in parameter_overrides or ()}
         super().__init__(node, overrides, self.rosz_call_soon)
         self._clock = ROSClock(self.rosz_node.clock)
         self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
@@ -102,7 +102,7 @@ class Node(NodeParameters):
         yield from (part for part in others if hasattr(part, "take"))
 
     def rosz_wake(self) -> None:
-        """Make the executor look for what is ready."""
+        """Make the executor look for callbacks that are ready."""
         executor = self.executor
         if executor is not None:
             executor.wake()

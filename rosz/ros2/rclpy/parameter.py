@@ -10,11 +10,12 @@ from __future__ import annotations
 import array
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, ParameterValue, SetParametersResult
+from rosz.node import Node as RoszNode
 from rosz.params import type_name
 from rosz.params.yaml import read_plain
 from rosz.ros2.rclpy.exceptions import (
@@ -24,9 +25,6 @@ from rosz.ros2.rclpy.exceptions import (
     ParameterNotDeclaredException,
     ParameterUninitializedException,
 )
-
-if TYPE_CHECKING:
-    from rosz.node import Node as RoszNode
 
 __all__ = ("PARAMETER_SEPARATOR_STRING", "NodeParameters", "Parameter", "get_parameter_value")
 
@@ -71,21 +69,21 @@ class Parameter:
         def check(self, parameter_value: Any) -> bool:
             """Return whether a value is of this type."""
             try:
-                found = _type_of(parameter_value)
+                actual = _type_of(parameter_value)
             except UsageError:
                 return False
-            return found is self or (
+            return actual is self or (
                 _is_empty(parameter_value) and self >= Parameter.Type.BYTE_ARRAY
             )
 
     def __init__(self, name: str, type_: Type | None = None, value: Any = None) -> None:
-        found = _type_of(value)
-        if type_ is not None and type_ is not found and not type_.check(value):
+        actual = _type_of(value)
+        if type_ is not None and type_ is not actual and not type_.check(value):
             raise UsageError(
                 f"parameter '{name}' has the value {value!r}; expected one of type {type_.name}"
             )
         self._name, self._value = name, value
-        self._type = found if type_ is None else type_
+        self._type = actual if type_ is None else type_
 
     @property
     def name(self) -> str:
@@ -163,12 +161,12 @@ def _type_of(value: Any) -> Parameter.Type:
     if scalar is not None:
         return scalar
     if isinstance(value, Sequence | array.array):
-        kinds = {type(one) for one in value}
+        kinds = {type(element) for element in value}
         if not kinds:
             return _Type.BYTE_ARRAY  # rclpy's type of an empty list
-        found = _ARRAYS.get(kinds.pop())
-        if found is not None and not kinds:
-            return found
+        array_type = _ARRAYS.get(kinds.pop())
+        if array_type is not None and not kinds:
+            return array_type
     raise UsageError(
         f"a parameter cannot be {value!r}; expected a bool, int, float, str, bytes or a list of one"
         " of them"
@@ -191,12 +189,7 @@ _MISSING = object()
 class NodeParameters:
     """The methods of `rclpy.node.Node` for its parameters.
 
-    Names of rosz's own begin with ``rosz_``, so that subclasses are free to use any others.
-
-    Args:
-        node: The node.
-        overrides: Values from the command line or the caller, by name.
-        call_soon: Function that passes a function to the executor that spins the node.
+    ``overrides`` are the values from the command line or the caller.
     """
 
     def __init__(
@@ -280,18 +273,18 @@ class NodeParameters:
 
     def _rosz_update(self, name: str) -> None:
         """Apply the value that another program has set."""
-        known = self._rosz_known.get(name)
+        parameter = self._rosz_known.get(name)
         value = self.rosz_node.params.get(_path(name), _MISSING)
-        if known is None or value is _MISSING or value == known.value:
+        if parameter is None or value is _MISSING or value == parameter.value:
             return
         try:
-            changed = _convert(name, value, known.type_)
+            changed = _convert(name, value, parameter.type_)
         except InvalidParameterTypeException as error:
-            self.rosz_node.log.warning("%s; it stays %r", error, known.value)
+            self.rosz_node.log.warning("%s; it stays %r", error, parameter.value)
             return
         reason = self._rosz_refusal([changed])
         if reason:
-            self.rosz_node.log.warning("parameter '%s' stays %r: %s", name, known.value, reason)
+            self.rosz_node.log.warning("parameter '%s' stays %r: %s", name, parameter.value, reason)
         else:
             self._rosz_known[name] = changed
 
@@ -312,12 +305,12 @@ class NodeParameters:
             ParameterNotDeclaredException: The parameter is not declared.
             ParameterUninitializedException: It was declared by type only, and has no value.
         """
-        found = self._rosz_known.get(name)
-        if found is None:
+        parameter = self._rosz_known.get(name)
+        if parameter is None:
             raise ParameterNotDeclaredException(name)
-        if found.type_ is _Type.NOT_SET and not self._rosz_descriptors[name].dynamic_typing:
+        if parameter.type_ is _Type.NOT_SET and not self._rosz_descriptors[name].dynamic_typing:
             raise ParameterUninitializedException(name)
-        return found
+        return parameter
 
     def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
         """Return several parameters."""
@@ -331,8 +324,8 @@ class NodeParameters:
         """Return the parameters below a prefix, by the rest of their names."""
         start = f"{prefix}." if prefix else ""
         return {
-            name.removeprefix(start): one
-            for name, one in self._rosz_known.items()
+            name.removeprefix(start): parameter
+            for name, parameter in self._rosz_known.items()
             if name.startswith(start)
         }
 
@@ -344,7 +337,7 @@ class NodeParameters:
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
         """Set parameters one by one, and return one result for each."""
-        return [self.set_parameters_atomically([one]) for one in parameter_list]
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
         """Set all parameters or none.
@@ -352,26 +345,27 @@ class NodeParameters:
         Raises:
             ParameterNotDeclaredException: A parameter is not declared.
         """
-        missing = [one.name for one in parameter_list if one.name not in self._rosz_known]
+        names = [parameter.name for parameter in parameter_list]
+        missing = [name for name in names if name not in self._rosz_known]
         if missing:
             raise ParameterNotDeclaredException(missing)
-        reasons = [self._rosz_mismatch(one) for one in parameter_list]
+        reasons = [self._rosz_mismatch(parameter) for parameter in parameter_list]
         reason = next(filter(None, reasons), "") or self._rosz_refusal(list(parameter_list))
         if reason:
             return SetParametersResult(successful=False, reason=reason)
-        for one in parameter_list:
-            self._rosz_set(one)
+        for parameter in parameter_list:
+            self._rosz_set(parameter)
         return SetParametersResult(successful=True)
 
     def _rosz_mismatch(self, parameter: Parameter) -> str:
         """Return why a parameter cannot have a value; empty if it can."""
         descriptor = self._rosz_descriptors[parameter.name]
-        known, given = self._rosz_known[parameter.name].type_, parameter.type_
+        declared, given = self._rosz_known[parameter.name].type_, parameter.type_
         if descriptor.read_only:
             return f"Trying to set a read-only parameter: {parameter.name}."
-        if descriptor.dynamic_typing or known is given or _Type.NOT_SET in {known, given}:
+        if descriptor.dynamic_typing or declared is given or _Type.NOT_SET in {declared, given}:
             return ""
-        return f"Wrong parameter type, expected 'Type.{known.name}' got 'Type.{given.name}'"
+        return f"Wrong parameter type, expected 'Type.{declared.name}' got 'Type.{given.name}'"
 
     def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
         """Call a function that may refuse parameters before they are set."""
@@ -401,7 +395,7 @@ def _convert(name: str, value: Any, kind: Parameter.Type) -> Parameter:
     if kind is _Type.DOUBLE and type(value) is int:
         value = float(value)  # YAML and ROS 1 write whole numbers without a point
     if kind is _Type.DOUBLE_ARRAY and isinstance(value, list):
-        value = [float(one) if type(one) is int else one for one in value]
+        value = [float(element) if type(element) is int else element for element in value]
     if not kind.check(value):
         raise InvalidParameterTypeException(name, kind.name, type_name(value))
     return Parameter(name, kind, value)

@@ -11,21 +11,6 @@ from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.ros2.rclpy.executors import Executor, Future, get_global_executor
 from rosz.ros2.rclpy.node import Node
 
-__all__ = (
-    "create_node",
-    "get_default_context",
-    "get_global_executor",
-    "get_rmw_implementation_identifier",
-    "init",
-    "ok",
-    "remove_ros_args",
-    "shutdown",
-    "spin",
-    "spin_once",
-    "spin_until_future_complete",
-    "try_shutdown",
-)
-
 
 def init(
     *,

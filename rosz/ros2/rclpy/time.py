@@ -222,12 +222,7 @@ class ROSClock(Clock):
 
 
 class Rate:
-    """Run a loop at a fixed rate.
-
-    Args:
-        period_ns: Period in nanoseconds.
-        source: Clock to follow.
-    """
+    """Run a loop at a fixed rate; made by ``Node.create_rate``."""
 
     def __init__(self, period_ns: int, source: _RosClock) -> None:
         self._rate = _Rate(1e9 / period_ns, source, reset=True)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Expand a xacro file."""
 
-from rosz.programs.xacro import main
+from rosz.ros1.tools.xacro import main
 
 main()

@@ -1,8 +1,8 @@
 """Actions as pages use them: the goals that pages sent, and the states that servers publish.
 
 Servers of ROS 2's protocol and of actionlib's topics look alike here. What has both, as actionlib
-of rosz, is used by ROS 2's. Goals belong to the process, not to a page, so that a page that is
-opened again, or in another browser, shows them.
+of rosz, is used by ROS 2's. Goals belong to the process, not to a page: a page that is opened
+again, or in another browser, shows them.
 """
 
 from __future__ import annotations
@@ -10,36 +10,42 @@ from __future__ import annotations
 import threading
 import time
 import uuid
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import msgspec
 
-from rosz.actions import ActionClient as ActionlibClient
-from rosz.actions import ActionTypes
+from rosz.access import PagePolicy
+from rosz.actions import (
+    FINAL,
+    STATUS,
+    TERMINAL,
+    ActionlibClient,
+    ActionlibState,
+    ActionTypes,
+    GoalState,
+    action_type,
+    list_actions,
+)
 from rosz.errors import ActionError, GoalFailed, NotFoundError, RoszError
 from rosz.graph import View
-from rosz.introspect.actions import action_type, list_actions
-from rosz.message.text import strify_message
+from rosz.message import strify_message
 from rosz.msgs.action_msgs.msg import GoalInfo
 from rosz.msgs.action_msgs.msg import GoalStatusArray as StatusArray
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.unique_identifier_msgs.msg import UUID
 from rosz.names import short_type
-from rosz.node.goals import FINAL, STATUS, GoalState
 from rosz.qos import LATCHED
+from rosz.queue import BoundedQueue
 from rosz.web.model.forms import read_form
-from rosz.web.model.permission import Permission
-from rosz.web.model.sharing import Shared, Use
+from rosz.web.model.sharing import SharedResource, Use
 from rosz.worker import Worker, run_task
 
 if TYPE_CHECKING:
-    from rosz.actions import ClientGoal as ActionlibGoal
+    from rosz.actions import ActionlibClientGoal, ClientGoal
     from rosz.node import Node
-    from rosz.node.action_client import ClientGoal
-
-__all__ = ("ActionRow", "ActionUse", "Actions", "GoalRow", "Port", "SentGoal")
 
 _MOST_GOALS = 30
 _MOST_FEEDBACK = 20
@@ -48,12 +54,6 @@ _LONGEST_TEXT = 4000
 _TIMEOUT = 10.0
 _LATE_SECONDS = 1.0
 """Time for feedback that its result has overtaken."""
-_NAMES = {
-    value: name.lower()
-    for name, value in vars(GoalStatus).items()
-    if name.isupper() and isinstance(value, int)
-}
-_RUNNING = frozenset({"pending", "active", "preempting", "recalling"})
 _GOAL = "ActionGoal"
 
 
@@ -98,8 +98,6 @@ class SentGoal:
         on_end: Function called with the goal when it has ended.
 
     Attributes:
-        action: As given.
-        text: As given.
         id: Identification of the goal, once it is sent.
         state: State as a word.
         done: Whether it has ended.
@@ -123,7 +121,7 @@ class SentGoal:
         self._started = time.monotonic()
         self._ended = 0.0
         self._lock = threading.Lock()
-        self._feedback: deque[tuple[int, Any]] = deque(maxlen=_MOST_FEEDBACK)
+        self._feedback: BoundedQueue[Any] = BoundedQueue(_MOST_FEEDBACK, _MOST_BYTES)
 
     @property
     def seconds(self) -> float:
@@ -135,15 +133,13 @@ class SentGoal:
         size = len(message.to_cdr())
         with self._lock:
             self.feedbacks += 1
-            self._feedback.append((size, message))
-            while len(self._feedback) > 1 and sum(one for one, _ in self._feedback) > _MOST_BYTES:
-                self._feedback.popleft()
+            self._feedback.put(message, size)
 
     def feedback(self) -> list[tuple[int, str]]:
         """Return the newest feedback as text with its numbers, the newest first."""
         with self._lock:
-            last, kept = self.feedbacks, [message for _, message in self._feedback]
-        return [(last - place, _text(one)) for place, one in enumerate(reversed(kept))]
+            last, kept = self.feedbacks, list(self._feedback)
+        return [(last - place, _text(message)) for place, message in enumerate(reversed(kept))]
 
     def advance(self, state: str) -> None:
         """Note a state that is not the end."""
@@ -163,45 +159,57 @@ def _text(message: Any) -> str:
     return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]} …"
 
 
-class Port(Protocol):
-    """A client of one action."""
+class ActionPort(ABC):
+    """A client of one action, which follows the states that the server publishes.
 
-    goal_type: type[Any]
+    Attributes:
+        goal_type: Class of the goals.
+    """
 
-    def send(self, goal: SentGoal, message: Any) -> None:
-        """Send a goal, and follow it."""
+    def __init__(self, name: str, goal_type: type[Any]) -> None:
+        self.goal_type: type[Any] = goal_type
+        self._name = name
+        self._statuses: list[Any] = []
 
-    def cancel(self, goal_id: str) -> str:
-        """Ask the server to end a goal, or all if the identification is empty; say what it does."""
+    def _receive(self, message: Any) -> None:
+        self._statuses = message.status_list
 
     def rows(self) -> list[GoalRow]:
         """Return the goals that the server knows, the newest first."""
+        return sorted(map(self._row, self._statuses), key=lambda row: -row.stamp)
 
+    @abstractmethod
+    def _row(self, status: Any) -> GoalRow:
+        """Return a goal as the page shows it."""
+
+    @abstractmethod
+    def send(self, goal: SentGoal, message: Any) -> None:
+        """Send a goal, and follow it."""
+
+    @abstractmethod
+    def cancel(self, goal_id: str) -> str:
+        """Ask the server to end a goal, or all without an identification; return its answer."""
+
+    @abstractmethod
     def close(self) -> None:
-        """Close the client."""
+        """Close the client; goals go on."""
 
 
-ActionUse: TypeAlias = "Use[Port]"
+ActionUse: TypeAlias = "Use[ActionPort]"
 """The use of a client of an action, until it is closed."""
 
 
-class _NativePort:
+class _Ros2Port(ActionPort):
     """A client by the protocol of ROS 2."""
 
     def __init__(self, node: Node, name: str, cls: type[Any]) -> None:
-        self.goal_type: type[Any] = cls.Goal
-        self._name = name
-        self._known: StatusArray | None = None
+        super().__init__(name, cls.Goal)
         self._client = node.action_client(name, cls)
-        self._status = node.subscription(
+        self._subscription = node.subscription(
             f"{name}/{STATUS}", StatusArray, self._receive, qos=LATCHED
         )
 
-    def _receive(self, message: StatusArray) -> None:
-        self._known = message
-
     def send(self, goal: SentGoal, message: Any) -> None:
-        """Send a goal, and follow it."""
         sent = self._client.send(
             message,
             feedback=goal.add_feedback,
@@ -221,7 +229,6 @@ class _NativePort:
             goal.finish("lost", None, str(error))
 
     def cancel(self, goal_id: str) -> str:
-        """Ask the server to end a goal, or all."""
         info = GoalInfo(UUID(uuid.UUID(goal_id).bytes)) if goal_id else GoalInfo()
         count = len(self._client.request_cancel(info, _TIMEOUT).goals_canceling)
         if goal_id and not count:
@@ -231,52 +238,33 @@ class _NativePort:
             )
         return f"the server cancels {count} goal{'s' * (count != 1)}"
 
-    def rows(self) -> list[GoalRow]:
-        """Return the goals that the server knows, the newest first."""
-        known = self._known
-        found = [
-            GoalRow(
-                str(uuid.UUID(bytes=bytes(one.goal_info.goal_id.uuid))),
-                _native_state(one.status).text,
-                _native_state(one.status) not in FINAL,
-                one.goal_info.stamp.to_nsec(),
-            )
-            for one in (known.status_list if known else ())
-        ]
-        return sorted(found, key=lambda one: -one.stamp)
+    def _row(self, status: Any) -> GoalRow:
+        info, number = status.goal_info, status.status
+        state = GoalState(number) if number in tuple(GoalState) else GoalState.UNKNOWN
+        goal_id = str(uuid.UUID(bytes=bytes(info.goal_id.uuid)))
+        return GoalRow(goal_id, state.text, state not in FINAL, info.stamp.to_nsec())
 
     def close(self) -> None:
-        """Close the client; goals go on."""
-        self._status.close()
+        self._subscription.close()
         self._client.close()
 
 
-def _native_state(status: int) -> GoalState:
-    return GoalState(status) if status in tuple(GoalState) else GoalState.UNKNOWN
-
-
-class _ActionlibPort:
+class _ActionlibPort(ActionPort):
     """A client by actionlib's topics."""
 
     def __init__(self, node: Node, name: str, cls: type[Any]) -> None:
-        self.goal_type: type[Any] = ActionTypes.of(cls, node.context.types).goal
-        self._name = name
-        self._known: GoalStatusArray | None = None
+        super().__init__(name, ActionTypes.of(cls, node.context.types).goal)
         self._client = ActionlibClient(node, name, cls)
-        self._goals: dict[str, ActionlibGoal] = {}
-        self._status = node.subscription(f"{name}/status", GoalStatusArray, self._receive)
-
-    def _receive(self, message: GoalStatusArray) -> None:
-        self._known = message
+        self._goals: dict[str, ActionlibClientGoal] = {}
+        self._subscription = node.subscription(f"{name}/status", GoalStatusArray, self._receive)
 
     def send(self, goal: SentGoal, message: Any) -> None:
-        """Send a goal, and follow it."""
         self._wait()
         sent = self._client.send(
             message,
-            on_done=lambda one: self._finish(goal, one),
+            on_done=lambda followed: self._finish(goal, followed),
             on_feedback=goal.add_feedback,
-            on_transition=lambda one: goal.advance(_NAMES[one.status.status]),
+            on_transition=lambda followed: goal.advance(_state_text(followed.status)),
         )
         goal.id = sent.id.id
         goal.advance("pending")
@@ -287,14 +275,13 @@ class _ActionlibPort:
         if not self._client.wait_for_server(_TIMEOUT):
             raise ActionError(f"the server of '{self._name}' was not there within {_TIMEOUT:g} s")
 
-    def _finish(self, goal: SentGoal, sent: ActionlibGoal) -> None:
+    def _finish(self, goal: SentGoal, sent: ActionlibClientGoal) -> None:
         self._goals.pop(sent.id.id, None)
         lost = sent.status.status == GoalStatus.LOST
         fault = sent.status.text if lost or sent.result is None else ""
-        goal.finish(_NAMES[sent.status.status], sent.result, fault)
+        goal.finish(_state_text(sent.status), sent.result, fault)
 
     def cancel(self, goal_id: str) -> str:
-        """Ask the server to end a goal, or all."""
         self._wait()
         sent = self._goals.get(goal_id)
         if sent is not None:
@@ -303,24 +290,19 @@ class _ActionlibPort:
             self._client.publish_cancel(GoalID(id=goal_id))
         return "the server was asked to cancel " + ("the goal" if goal_id else "all goals")
 
-    def rows(self) -> list[GoalRow]:
-        """Return the goals that the server knows, the newest first."""
-        known = self._known
-        found = [
-            GoalRow(
-                one.goal_id.id,
-                _NAMES.get(one.status, str(one.status)),
-                _NAMES.get(one.status) in _RUNNING,
-                one.goal_id.stamp.to_nsec(),
-            )
-            for one in (known.status_list if known else ())
-        ]
-        return sorted(found, key=lambda one: -one.stamp)
+    def _row(self, status: Any) -> GoalRow:
+        running = status.status in tuple(ActionlibState) and status.status not in TERMINAL
+        goal_id = status.goal_id
+        return GoalRow(goal_id.id, _state_text(status), running, goal_id.stamp.to_nsec())
 
     def close(self) -> None:
-        """Close the client; goals go on."""
-        self._status.close()
+        self._subscription.close()
         self._client.stop()
+
+
+def _state_text(status: GoalStatus) -> str:
+    number = status.status
+    return ActionlibState(number).text if number in tuple(ActionlibState) else str(number)
 
 
 class Actions:
@@ -328,43 +310,38 @@ class Actions:
 
     Args:
         node: The node that sends them.
-        permission: What pages may change.
+        permission: The changes that pages may make.
     """
 
-    def __init__(self, node: Node, permission: Permission) -> None:
+    def __init__(self, node: Node, permission: PagePolicy) -> None:
         self._node = node
         self._permission = permission
         self._lock = threading.Lock()
         self._goals: deque[SentGoal] = deque(maxlen=_MOST_GOALS)
-        self._ports: dict[str, Shared[Port]] = {}
-        self._uses: dict[SentGoal, Use[Port]] = {}
+        self._ports: dict[str, SharedResource[ActionPort]] = {}
+        self._uses: dict[SentGoal, Use[ActionPort]] = {}
         self._view: View = View(())
         self._worker = Worker("rosz-web-goals", run_task)
 
-    @property
-    def users(self) -> int:
-        """Number of uses that pages and goals have open."""
-        return sum(one.users for one in list(self._ports.values()))
-
     def rows(self, view: View) -> list[ActionRow]:
         """Return the actions that nodes serve, sorted by name."""
-        found = {
-            one.name: ActionRow(
-                one.name, one.types[0].replace("/action/", "/"), one.servers, "ROS 2"
+        rows = {
+            entry.name: ActionRow(
+                entry.name, entry.types[0].replace("/action/", "/"), entry.servers, "ROS 2"
             )
-            for one in list_actions(view)
-            if one.servers
+            for entry in list_actions(view)
+            if entry.servers
         }
         for name, types in view.topics().items():
             action = name.removesuffix("/goal")
             kind = short_type(types[0])
-            if action == name or action in found or not kind.endswith(_GOAL):
+            if action == name or action in rows or not kind.endswith(_GOAL):
                 continue
-            servers = {one.node_name for one in view.publishers(f"{action}/result")}
+            servers = {token.node_name for token in view.publishers(f"{action}/result")}
             if servers:
                 kind = kind.removesuffix(_GOAL)
-                found[action] = ActionRow(action, kind, tuple(sorted(servers)), "actionlib")
-        return [found[name] for name in sorted(found)]
+                rows[action] = ActionRow(action, kind, tuple(sorted(servers)), "actionlib")
+        return [rows[name] for name in sorted(rows)]
 
     def use(self, view: View, name: str) -> ActionUse:
         """Open a client of an action, which all share; it may take some seconds.
@@ -377,23 +354,23 @@ class Actions:
         """
         with self._lock:
             self._view = view
-            shared = self._ports.setdefault(name, Shared(lambda: self._open(name)))
+            shared = self._ports.setdefault(name, SharedResource(lambda: self._open(name)))
         return shared.use()
 
-    def _open(self, name: str) -> Port:
+    def _open(self, name: str) -> ActionPort:
         view = self._view
-        row = next((one for one in self.rows(view) if one.name == name), None)
+        row = next((candidate for candidate in self.rows(view) if candidate.name == name), None)
         if row is None:
             raise NotFoundError(f"no node serves action '{name}'")
         if row.protocol == "ROS 2":
-            return _NativePort(self._node, name, action_type(self._node, view, name))
+            return _Ros2Port(self._node, name, action_type(self._node, view, name))
         types = self._node.context.types
         return _ActionlibPort(self._node, name, types.message(f"{row.type}Action"))
 
     def goals(self, action: str) -> list[SentGoal]:
         """Return the goals that were sent to an action, the newest first."""
         with self._lock:
-            return [one for one in reversed(self._goals) if one.action == action]
+            return [goal for goal in reversed(self._goals) if goal.action == action]
 
     def send(self, view: View, name: str, text: str) -> SentGoal:
         """Send a goal, and wait until the server has accepted it.
@@ -431,7 +408,7 @@ class Actions:
             self._worker.later(_LATE_SECONDS, use.close)
 
     def cancel(self, view: View, name: str, goal_id: str = "") -> str:
-        """Ask the server to end a goal, or all goals, also of others; return what it does.
+        """Ask the server to end a goal, or all goals of all clients; return its answer as text.
 
         Args:
             view: The running nodes.

@@ -6,51 +6,30 @@ from typing import Literal
 
 import msgspec
 
-__all__ = ("BagCommand", "BagOrder", "BagReport", "PlayOrder", "RecordOrder")
+from rosz.bags.play import PlayOptions
+from rosz.bags.record import RecordOptions
 
 
-class RecordOrder(msgspec.Struct, frozen=True, kw_only=True):
-    """A recording.
+class RecordOrder(RecordOptions, frozen=True, kw_only=True):
+    """A recording, whose bag is in the working directory.
 
     Attributes:
-        name: Name of the bag, with its suffix, in the working directory.
         topics: Full names of topics; all topics if there is none.
         exclude: Regular expression of topics that are not recorded.
-        compression: Name of the compression.
-        split_size: Size in bytes at which another bag begins; 0 for none.
-        split_seconds: Seconds after which another bag begins; 0 for none.
-        max_splits: Number of bags to keep; 0 for all.
     """
 
-    name: str
     topics: tuple[str, ...] = ()
     exclude: str = ""
-    compression: Literal["none", "bz2", "lz4", "zstd"] = "none"
-    split_size: int = 0
-    split_seconds: float = 0.0
-    max_splits: int = 0
 
 
-class PlayOrder(msgspec.Struct, frozen=True, kw_only=True):
+class PlayOrder(PlayOptions, frozen=True, kw_only=True):
     """A bag to play.
 
     Attributes:
         name: Name of the bag in the working directory.
-        topics: Names of the topics to play; all if there is none.
-        prefix: Text put before the names of topics.
-        rate: Seconds of the bag per second.
-        loop: Whether to begin again at the end.
-        paused: Whether to begin with a pause.
-        clock: Whether to publish ``/clock``.
     """
 
     name: str
-    topics: tuple[str, ...] = ()
-    prefix: str = ""
-    rate: float = 1.0
-    loop: bool = False
-    paused: bool = False
-    clock: bool = False
 
 
 class BagOrder(msgspec.Struct, frozen=True):

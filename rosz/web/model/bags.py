@@ -23,13 +23,11 @@ from typing import Any, Final, cast
 
 import msgspec
 
-from rosz.bags.summary import Summary, summarize
+from rosz.access import PagePolicy
+from rosz.bags import Summary, summarize
 from rosz.errors import BagError, NotFoundError, UsageError
 from rosz.web.model.bag_orders import BagCommand, BagOrder, BagReport, PlayOrder, RecordOrder
-from rosz.web.model.permission import Permission
 from rosz.worker import Worker
-
-__all__ = ("COMPRESSIONS", "BagFolder", "BagRow", "BagRun", "Bags")
 
 COMPRESSIONS: Final = {".mcap": ("none", "zstd", "lz4"), ".bag": ("none", "bz2", "lz4")}
 """The compressions of each format of a recording, by its suffix."""
@@ -66,9 +64,6 @@ class BagRow(msgspec.Struct, frozen=True):
 class BagFolder:
     """The bags of one folder. Nothing else is reachable by it, and no link is followed.
 
-    Args:
-        path: The folder.
-
     Attributes:
         path: The folder, absolute.
     """
@@ -84,10 +79,10 @@ class BagFolder:
         """
         try:
             with os.scandir(self.path) as entries:
-                found = [row for entry in entries if (row := _row(entry))]
+                listing = [row for entry in entries if (row := _row(entry))]
         except OSError as error:
             raise BagError(f"cannot read the folder: {error.strerror}", str(self.path)) from error
-        return sorted(found, key=lambda one: (-one.changed, one.name))
+        return sorted(listing, key=lambda row: (-row.changed, row.name))
 
     def find(self, name: str) -> Path:
         """Return the path of a bag.
@@ -95,12 +90,12 @@ class BagFolder:
         Raises:
             NotFoundError: The folder has no such bag.
         """
-        if not any(one.name == name for one in self.rows()):
+        if not any(row.name == name for row in self.rows()):
             raise NotFoundError(f"folder '{self.path}' has no bag '{name}'")
         return self.path / name
 
     def summary(self, name: str) -> tuple[Summary, list[str]]:
-        """Return what is in a bag, and what is wrong with it.
+        """Return the summary of a bag, and its problems.
 
         Raises:
             NotFoundError: The folder has no such bag.
@@ -111,23 +106,7 @@ class BagFolder:
 
         path = self.find(name)
         with open_reader(path) as reader:
-            return summarize(name, reader), [str(one) for one in reader.problems]
-
-    def delete(self, name: str) -> None:
-        """Delete a bag.
-
-        Raises:
-            NotFoundError: The folder has no such bag.
-            BagError: It cannot be deleted.
-        """
-        path = self.find(name)
-        try:
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink()
-        except OSError as error:
-            raise BagError(f"cannot delete it: {error.strerror}", str(path)) from error
+            return summarize(name, reader), [str(problem) for problem in reader.problems]
 
 
 def _row(entry: os.DirEntry[str]) -> BagRow | None:
@@ -136,8 +115,8 @@ def _row(entry: os.DirEntry[str]) -> BagRow | None:
         if entry.is_dir(follow_symlinks=False):
             if not _is_plain(Path(entry.path, _METADATA)):
                 return None
-            files = [one for one in Path(entry.path).iterdir() if _is_plain(one)]
-            size = sum(one.stat().st_size for one in files)
+            files = [file for file in Path(entry.path).iterdir() if _is_plain(file)]
+            size = sum(file.stat().st_size for file in files)
             return BagRow(entry.name, size, entry.stat(follow_symlinks=False).st_mtime, True)
         if not entry.is_file(follow_symlinks=False) or not entry.name.endswith(_SUFFIXES):
             return None
@@ -154,7 +133,7 @@ def _is_plain(path: Path) -> bool:
 
 def _archive(path: Path) -> Iterator[bytes]:
     """Yield a bag of rosbag2 as a tar archive, in pieces."""
-    for file in sorted(one for one in path.iterdir() if _is_plain(one)):
+    for file in sorted(child for child in path.iterdir() if _is_plain(child)):
         with file.open("rb") as opened:
             info = tarfile.TarInfo(f"{path.name}/{file.name}")
             about = os.fstat(opened.fileno())
@@ -173,14 +152,13 @@ class BagRun:
     """A process that records or plays, until it ends or is closed.
 
     Args:
-        order: What it does.
+        order: Its options.
         folder: Its working directory.
         starter: What starts it: the process has the priority of its thread.
 
     Attributes:
-        order: As given.
         last: Its newest report.
-        lines: What it said last.
+        lines: Its last lines of output.
         fault: Why it failed; empty if it did not.
         bytes_per_second: Bytes recorded per second.
         messages_per_second: Messages per second.
@@ -219,11 +197,6 @@ class BagRun:
     def ended(self) -> bool:
         """Whether it has ended."""
         return self._ended.is_set()
-
-    @property
-    def pid(self) -> int:
-        """Number of its process."""
-        return self._process.pid
 
     @property
     def silent(self) -> bool:
@@ -305,7 +278,7 @@ class Bags:
 
     Args:
         folder: The folder.
-        permission: What pages may change.
+        permission: The changes that pages may make.
 
     Attributes:
         folder: The bags.
@@ -313,7 +286,7 @@ class Bags:
         playing: The same of playing.
     """
 
-    def __init__(self, folder: Path, permission: Permission) -> None:
+    def __init__(self, folder: Path, permission: PagePolicy) -> None:
         self.folder: BagFolder = BagFolder(folder)
         self.recording: BagRun | None = None
         self.playing: BagRun | None = None
@@ -330,7 +303,7 @@ class Bags:
             UsageError: The page may not record, the name is not valid, or a recording is running.
             BagError: The process cannot be started.
         """
-        self._permission.check_files("record bags")
+        self._permission.check_control("record bags")
         self._permission.check_topics("subscribe", order.topics)
         name = order.name or time.strftime("%Y-%m-%d-%H-%M-%S.mcap")
         if not _NAME.fullmatch(name) or Path(name).suffix not in COMPRESSIONS:
@@ -353,7 +326,7 @@ class Bags:
             BagError: The bag cannot be read, or the process not be started.
         """
         summary, _ = self.folder.summary(order.name)
-        for topic in order.topics or [one.topic for one in summary.topics]:
+        for topic in order.topics or [entry.topic for entry in summary.topics]:
             self._permission.check("publish", order.prefix + topic)
         with self._lock:
             if self.playing is not None:
@@ -378,7 +351,7 @@ class Bags:
         Raises:
             UsageError: The page may not.
         """
-        self._permission.check_files("record bags")
+        self._permission.check_control("record bags")
         if self.recording is not None:
             self.recording.control(BagCommand("stop"))
 
@@ -390,12 +363,19 @@ class Bags:
             NotFoundError: The folder has no such bag.
             BagError: It cannot be deleted.
         """
-        self._permission.check_files("delete bags")
+        self._permission.check_control("delete bags")
         recording = self.recording
         active = None if recording is None or recording.ended else recording.last.path + _ACTIVE
         if name == active:
             raise UsageError(f"'{name}' is being recorded; stop that first")
-        self.folder.delete(name)
+        path = self.folder.find(name)
+        try:
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+        except OSError as error:
+            raise BagError(f"cannot delete it: {error.strerror}", str(path)) from error
         return True
 
     def open(self, name: str) -> tuple[Path, Iterator[bytes] | None]:
@@ -408,7 +388,7 @@ class Bags:
         """
         path = self.folder.find(name)
         if self._permission.permit is not None:
-            topics = [one.topic for one in self.folder.summary(name)[0].topics]
+            topics = [entry.topic for entry in self.folder.summary(name)[0].topics]
             self._permission.check_topics("subscribe", topics)
         if name.endswith(_ACTIVE):
             raise UsageError(

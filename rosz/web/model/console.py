@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import threading
-from collections import deque
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from rosz.errors import DecodeError
-from rosz.introspect.rosout import LogFilter, LogLine, read_line
-from rosz.introspect.subscribe import subscribe_samples
+from rosz.introspect import LogFilter, LogLine, read_line, subscribe_samples
 from rosz.msgs.rcl_interfaces.msg import Log
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-    from rosz.session import Sample
-
-__all__ = ("LogBook",)
+from rosz.node import Node
+from rosz.queue import BoundedQueue
+from rosz.session import Sample
 
 _MOST_LINES = 10_000
 _MOST_BYTES = 8 << 20
@@ -38,8 +33,7 @@ class LogBook:
     def __init__(self, node: Node) -> None:
         self.received: int = 0
         self._lock = threading.Lock()
-        self._samples: deque[tuple[int, bytes]] = deque()
-        self._bytes = 0
+        self._samples: BoundedQueue[tuple[int, bytes]] = BoundedQueue(_MOST_LINES, _MOST_BYTES)
         self._entity = subscribe_samples(
             node, "/rosout", Log._type_name, Log._type_hash, self._receive
         )
@@ -48,16 +42,12 @@ class LogBook:
         payload = sample.payload
         with self._lock:
             self.received += 1
-            self._samples.append((self.received, payload))
-            self._bytes += len(payload)
-            while len(self._samples) > _MOST_LINES or self._bytes > _MOST_BYTES:
-                self._bytes -= len(self._samples.popleft()[1])
+            self._samples.put((self.received, payload), len(payload))
 
     def clear(self) -> None:
         """Forget all lines."""
         with self._lock:
             self._samples.clear()
-            self._bytes = 0
 
     def newest(
         self,
@@ -78,13 +68,12 @@ class LogBook:
         """
         with self._lock:
             samples = list(self._samples)
-        found: list[tuple[int, LogLine]] = []
-        for number, line in _lines(samples, nodes, until):
-            if between[0] <= line.stamp <= between[1] and wanted.accepts(line):
-                found.append((number, line))
-                if len(found) >= most:
-                    break
-        return found
+        passing = (
+            (number, line)
+            for number, line in _lines(samples, nodes, until)
+            if between[0] <= line.stamp <= between[1] and wanted.accepts(line)
+        )
+        return list(itertools.islice(passing, most))
 
     def close(self) -> None:
         """Unsubscribe."""

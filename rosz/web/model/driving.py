@@ -4,31 +4,23 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING
 
+from rosz.access import PagePolicy
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
-from rosz.web.model.permission import Permission
+from rosz.node import Node
 from rosz.worker import Worker, run_task
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("DEAD_MAN_SECONDS", "Driver")
 
 DEAD_MAN_SECONDS = 0.6
 """Seconds without a sign of life after which it stops."""
 _PERIOD = 0.1
 
 
-class Driver:
+class VelocityPublisher:
     """Publishes velocities ten times per second while it drives, and zero once when it stops.
 
     Args:
         node: The node that publishes.
-        permission: What the page may change.
-        topic: Full name of the topic.
-
-    Attributes:
+        permission: The changes that the page may make.
         topic: Full name of the topic.
 
     Raises:
@@ -36,7 +28,7 @@ class Driver:
         InvalidName: The name is not legal.
     """
 
-    def __init__(self, node: Node, permission: Permission, topic: str) -> None:
+    def __init__(self, node: Node, permission: PagePolicy, topic: str) -> None:
         permission.check("publish", node.resolve(topic))
         self.topic = node.resolve(topic)
         self._publisher = node.publisher(topic, Twist, queue_size=1)
@@ -45,11 +37,6 @@ class Driver:
         self._velocity = (0.0, 0.0)
         self._driving = False
         self._alive = 0.0
-
-    @property
-    def driving(self) -> bool:
-        """Whether it publishes velocities."""
-        return self._driving
 
     def alive(self) -> None:
         """Note that the browser is there."""

@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rosz.access import PagePolicy
+from rosz.introspect import Survey
 from rosz.names import namespace, short_type
+from rosz.node import Node
 from rosz.transforms import to_rpy
-from rosz.web.model.permission import Permission
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("FloorPlan", "Surroundings", "draw_floor", "find_floor")
 
 _CELL = 0.05
 """Size in metres of the squares in which one seen point is kept."""
@@ -53,7 +49,7 @@ class Surroundings:
             self.trail.append((x, y))
 
     def see(self, begin: float, step: float, ranges: Any, longest: float) -> None:
-        """Note what the laser sees, which is taken to be in the middle of the robot.
+        """Add a scan; the laser is taken to be in the middle of the robot.
 
         Args:
             begin: Angle of the first beam in rad.
@@ -82,7 +78,7 @@ class Surroundings:
 
 
 def draw_floor(seen: Surroundings) -> str:
-    """Return what is seen as SVG; empty before the robot is known."""
+    """Return the floor plan as SVG; empty before the robot's place is known."""
     if seen.pose is None:
         return ""
     x, y, theta = seen.pose
@@ -118,12 +114,12 @@ def find_floor(survey: Survey, topic: str) -> dict[str, str]:
         topic: Full name of the topic of velocities.
     """
     where = namespace(topic).rstrip("/")
-    found = {}
+    floors = {}
     for name, type_name in _TYPES.items():
         for token in survey.view.publishers(f"{where}/{name}"):
             if short_type(token.type_name) == type_name:
-                found[name] = f"{where}/{name}"
-    return found
+                floors[name] = f"{where}/{name}"
+    return floors
 
 
 class FloorPlan:
@@ -131,14 +127,14 @@ class FloorPlan:
 
     Args:
         node: The node that subscribes.
-        permission: What the page may do.
+        permission: The rights of the page.
         topics: Topics of odometry and laser, by ``odom`` and ``scan``.
 
     Raises:
         UsageError: The page may not subscribe to one of them.
     """
 
-    def __init__(self, node: Node, permission: Permission, topics: dict[str, str]) -> None:
+    def __init__(self, node: Node, permission: PagePolicy, topics: dict[str, str]) -> None:
         for topic in topics.values():
             permission.check("subscribe", topic)
         self.topics = topics
@@ -167,7 +163,7 @@ class FloorPlan:
             )
 
     def picture(self) -> str:
-        """Return what is seen as SVG; empty before the robot is known."""
+        """Return the floor plan as SVG; empty before the robot's place is known."""
         with self._lock:
             if self._drawn[0] != self._seen.version:
                 self._drawn = self._seen.version, draw_floor(self._seen)

@@ -16,13 +16,10 @@ import yaml
 
 from rosz.errors import DefinitionError, EncodeError, UsageError, YamlError
 from rosz.idl import Constant, MessageSpec, parse_message
-from rosz.introspect.arguments import make_message, read_arguments
-from rosz.message import INTEGER_RANGES, Slot, slot_type, slots
-from rosz.message.convert import shown_name, to_plain
+from rosz.introspect import make_message, read_arguments
+from rosz.message import INTEGER_RANGES, Slot, shown_name, slot_type, slots, to_plain
 from rosz.params.yaml import read_plain
 from rosz.time import DurationValue, TimeValue
-
-__all__ = ("Form", "FormField", "form_fields", "form_of", "read_form")
 
 _WIDE = frozenset({"int64", "uint64"})
 """Types whose values a browser's numbers do not hold."""
@@ -40,7 +37,7 @@ class FormField(msgspec.Struct, frozen=True):
         kind: How it is edited; ``yaml`` is a value that is written as YAML on one line, ``message``
             a group of fields.
         type: Type as ROS 1 spells it.
-        hint: What the definition says of it.
+        hint: The comment of its definition.
         low: Smallest value of an integer.
         high: Largest value of an integer.
         choices: Names of values that the definition has constants for.
@@ -64,7 +61,7 @@ class FormField(msgspec.Struct, frozen=True):
     @property
     def size(self) -> int:
         """Number of fields that are edited in it."""
-        return sum(one.size for one in self.fields) if self.kind == "message" else 1
+        return sum(field.size for field in self.fields) if self.kind == "message" else 1
 
 
 def form_of(cls: type[Any]) -> str:
@@ -88,8 +85,8 @@ def read_form(cls: type[Any], text: str, now: int) -> Any:
 
 
 def _document(text: str) -> Any:
-    given = [one for one in read_arguments([text.strip() or "{}"]) if one is not None]
-    return given[0] if given else {}
+    given = read_arguments([text.strip() or "{}"])
+    return next((document for document in given if document is not None), {})
 
 
 def form_fields(cls: type[Any], path: tuple[str, ...] = ()) -> tuple[FormField, ...]:
@@ -125,11 +122,11 @@ def _field(slot: Slot, spec: MessageSpec | None, above: tuple[str, ...]) -> Form
 
 def _hint(spec: MessageSpec | None, name: str) -> str:
     """Return the comment in the line of a field."""
-    found = next((one for one in spec.fields if one.name == name), None) if spec else None
-    if spec is None or found is None or not found.line:
+    if spec is None:
         return ""
-    line = spec.text.splitlines()[found.line - 1]
-    return line.partition("#")[2].strip()
+    lines = spec.text.splitlines()
+    comments = (lines[field.line - 1] for field in spec.fields if field.name == name and field.line)
+    return next(comments, "").partition("#")[2].strip()
 
 
 def _choices(spec: MessageSpec | None, name: str, kind: str) -> dict[Any, str]:
@@ -141,18 +138,24 @@ def _choices(spec: MessageSpec | None, name: str, kind: str) -> dict[Any, str]:
     """
     if spec is None or kind in ("bool", "float32", "float64"):
         return {}
-    constants = [one for one in spec.constants if _fits(one, kind)]
-    chosen = [one for one in constants if f"_{name.upper()}_" in f"_{one.name}"]
+    constants = [constant for constant in spec.constants if _fits(constant, kind)]
+    chosen = [constant for constant in constants if f"_{name.upper()}_" in f"_{constant.name}"]
     if not chosen:
         headings = _headings(spec.text)
-        chosen = [one for one in constants if name in _WORD.findall(headings.get(one.name, ""))]
+        chosen = [
+            constant
+            for constant in constants
+            if name in _WORD.findall(headings.get(constant.name, ""))
+        ]
     if not chosen:
-        same = [one for one in spec.fields if one.type.base == kind]
-        chosen = [one for one in constants if one.type == kind] if len(same) == 1 else []
-    found: dict[Any, str] = {}
-    for one in chosen:
-        found[one.value] = f"{found[one.value]}, {one.name}" if one.value in found else one.name
-    return found
+        same = [field for field in spec.fields if field.type.base == kind]
+        chosen = (
+            [constant for constant in constants if constant.type == kind] if len(same) == 1 else []
+        )
+    names: dict[Any, list[str]] = {}
+    for constant in chosen:
+        names.setdefault(constant.value, []).append(constant.name)
+    return {value: ", ".join(alike) for value, alike in names.items()}
 
 
 def _fits(constant: Constant, kind: str) -> bool:
@@ -165,7 +168,7 @@ def _fits(constant: Constant, kind: str) -> bool:
 
 def _headings(text: str) -> dict[str, str]:
     """Return the comment above the block of each constant of a definition."""
-    found: dict[str, str] = {}
+    headings: dict[str, str] = {}
     heading, comment = "", False
     for line in map(str.strip, text.splitlines()):
         if line.startswith("#"):
@@ -174,10 +177,10 @@ def _headings(text: str) -> dict[str, str]:
         comment = False
         constant = _CONSTANT.match(line)
         if constant:
-            found[constant[1]] = heading
+            headings[constant[1]] = heading
         else:
             heading = ""
-    return found
+    return headings
 
 
 class Form:
@@ -228,11 +231,11 @@ class Form:
         return _as_yaml(self._at(field.path), flow=True)
 
     def _at(self, path: Sequence[str]) -> Any:
-        found = self._message
+        value = self._message
         for name in path:
-            held = {shown_name(slot.name): slot.name for slot in slots(type(found))}
-            found = getattr(found, held[name])
-        return found
+            names = {shown_name(slot.name): slot.name for slot in slots(type(value))}
+            value = getattr(value, names[name])
+        return value
 
     def change(self, field: FormField, value: Any, now: int) -> str:
         """Write a field into the text, and return why that is not possible; empty if it is.
@@ -264,17 +267,13 @@ def _with(cls: type[Any], given: Any, message: Any, path: Sequence[str], value: 
     plain: dict[str, Any] = dict(given) if isinstance(given, dict) else to_plain(message)
     name, *rest = path
     if rest:
-        slot = next(one for one in slots(cls) if shown_name(one.name) == name)
+        slot = next(slot for slot in slots(cls) if shown_name(slot.name) == name)
         inner: Any = slot.kind
         plain[name] = _with(inner, plain.get(name, {}), getattr(message, slot.name), rest, value)
     else:
         plain[name] = value
     order = [shown_name(slot.name) for slot in slots(cls)]
-    return {one: plain[one] for one in sorted(plain, key=lambda one: _index(order, one))}
-
-
-def _index(order: Sequence[str], name: str) -> int:
-    return order.index(name) if name in order else len(order)
+    return {name: plain[name] for name in order if name in plain} | plain
 
 
 def _as_yaml(value: Any, *, flow: bool | None = None) -> str:
@@ -296,7 +295,7 @@ def _listed(value: Any) -> Any:
     if hasattr(value, "_schema"):
         value = {shown_name(slot.name): getattr(value, slot.name) for slot in slots(type(value))}
     if isinstance(value, dict):
-        return {name: _listed(one) for name, one in value.items()}
+        return {name: _listed(item) for name, item in value.items()}
     if hasattr(value, "tolist"):
         return value.tolist()
-    return [_listed(one) for one in value] if isinstance(value, bytes | list | tuple) else value
+    return [_listed(item) for item in value] if isinstance(value, bytes | list | tuple) else value

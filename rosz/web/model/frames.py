@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING
 
+from rosz.access import PagePolicy
 from rosz.errors import DecodeError, TransformError
+from rosz.node import Node
 from rosz.transforms import IDENTITY, Buffer, Pose, TransformListener
-from rosz.web.model.permission import Permission
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("Frames", "read_frame")
 
 _PREFERRED = ("map", "odom", "world", "base_footprint", "base_link")
 _LENGTH = 10_000_000_000
@@ -24,7 +19,7 @@ class Frames:
 
     Args:
         node: The node that receives them.
-        permission: What the page may do; everything without one.
+        permission: The rights of the page; without it, all.
 
     Attributes:
         buffer: The transforms.
@@ -32,7 +27,7 @@ class Frames:
         version: Number that grows with each message.
     """
 
-    def __init__(self, node: Node, permission: Permission | None = None) -> None:
+    def __init__(self, node: Node, permission: PagePolicy | None = None) -> None:
         self.buffer: Buffer = Buffer(_LENGTH)
         self.fault: str = "" if permission is None else permission.objection("subscribe", "/tf")
         self.version: int = 0
@@ -43,19 +38,15 @@ class Frames:
         del static
         self.version += 1
 
-    def names(self) -> list[str]:
-        """Return the names of all frames, sorted."""
-        return self.buffer.frames()
-
     def best(self) -> str:
         """Return the frame that most views are fixed to; empty if there is none."""
-        known = self.names()
+        names = self.buffer.frames()
         for name in _PREFERRED:
-            if name in known:
+            if name in names:
                 return name
         children = self.buffer.histories()
-        roots = [name for name in known if name not in children]
-        return next(iter(roots or known), "")
+        roots = [name for name in names if name not in children]
+        return next(iter(roots or names), "")
 
     def find(self, fixed: str, frame: str, stamp: int = 0) -> Pose:
         """Return the pose of a frame in another one.

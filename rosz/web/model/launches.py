@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections import deque
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import msgspec
 
+from rosz.access import PagePolicy
 from rosz.errors import NotFoundError, RoszError
 from rosz.launch.run import LaunchStatus, NodeStatus, StatusClient
-from rosz.web.model.permission import Permission
+from rosz.node import Node
+from rosz.queue import BoundedQueue
 from rosz.worker import Worker, run_task
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("Launches", "NodeOutput", "RunningLaunch")
 
 _PERIOD = 2.0
 _OUTPUT_PERIOD = 0.4
@@ -29,7 +25,7 @@ class RunningLaunch(msgspec.Struct, frozen=True):
     """A launch that runs.
 
     Attributes:
-        key: What it is called by in requests.
+        key: Its name in requests.
         status: Its status.
         shares: Share of one processor that each node uses, by name; those that are known.
     """
@@ -40,7 +36,7 @@ class RunningLaunch(msgspec.Struct, frozen=True):
 
     def find(self, name: str) -> NodeStatus | None:
         """Return the node of a name, or None."""
-        return next((one for one in self.status.nodes if one.name == name), None)
+        return next((node for node in self.status.nodes if node.name == name), None)
 
 
 class Launches:
@@ -48,14 +44,14 @@ class Launches:
 
     Args:
         node: The node whose session asks them.
-        permission: What the page may change.
+        permission: The changes that the page may make.
 
     Attributes:
         found: The launches, or None before they were first looked for.
         fault: Why they could not be found; empty if they could.
     """
 
-    def __init__(self, node: Node, permission: Permission) -> None:
+    def __init__(self, node: Node, permission: PagePolicy) -> None:
         self.found: tuple[RunningLaunch, ...] | None = None
         self.fault: str = ""
         self._permission = permission
@@ -68,7 +64,7 @@ class Launches:
         self._worker.later(_PERIOD, self._look_again)
 
     def _look(self) -> None:
-        before = {one.key: one for one in self.found or ()}
+        before = {launch.key: launch for launch in self.found or ()}
         try:
             running = self._client.running()
         except RoszError as error:
@@ -93,7 +89,7 @@ class Launches:
             UsageError: The page may not.
             LaunchError: The launch refuses, or the node could not be started again.
         """
-        self._permission.check_control(name)
+        self._permission.check_control(f"control '{name}'")
         try:
             self._client.act(key, action, name)
         finally:
@@ -110,8 +106,7 @@ class Launches:
             parts.append(f"It is a container: {', '.join(node.members)} {ends}.")
         if action == "restart":
             return " ".join(parts)
-        others = [one for one in launch.status.nodes if one.name != name and one.pid]
-        if not others:
+        if not any(other.pid for other in launch.status.nodes if other.name != name):
             parts.append("No other node of its launch runs: the launch ends with it.")
             return " ".join(parts)
         parts.append("It is not started again until you restart it.")
@@ -128,11 +123,11 @@ def _shares(status: LaunchStatus, before: RunningLaunch | None) -> dict[str, flo
     if before is None:
         return {}
     seconds = status.sampled - before.status.sampled
-    earlier = {one.name: one for one in before.status.nodes}
+    earlier = {node.name: node for node in before.status.nodes}
     return {
-        one.name: max(0.0, one.cpu - earlier[one.name].cpu) / seconds
-        for one in status.nodes
-        if one.name in earlier and one.pid == earlier[one.name].pid and one.pid and seconds > 0
+        node.name: max(0.0, node.cpu - earlier[node.name].cpu) / seconds
+        for node in status.nodes
+        if node.name in earlier and node.pid == earlier[node.name].pid and node.pid and seconds > 0
     }
 
 
@@ -144,7 +139,7 @@ class NodeOutput:
         name: Full name of the node whose output it is.
 
     Attributes:
-        state: What the launch says of the node, or what is wrong.
+        state: The state of the node as the launch reports it, or the reason of a failure.
         skipped: Number of bytes that were left out, as they came faster than they are read.
     """
 
@@ -154,8 +149,7 @@ class NodeOutput:
         self._name = name
         self._client = StatusClient(node.context.session, node.context.domain)
         self._lock = threading.Lock()
-        self._parts: deque[str] = deque()
-        self._size = 0
+        self._parts: BoundedQueue[str] = BoundedQueue(most_bytes=_MOST_BYTES)
         self._launch: RunningLaunch | None = None
         self._position: tuple[int, int] | None = None
         self._worker = Worker("rosz-web-output", run_task, logger=_log)
@@ -180,10 +174,7 @@ class NodeOutput:
         self._position = excerpt.position
         if excerpt.text:
             with self._lock:
-                self._parts.append(excerpt.text)
-                self._size += len(excerpt.text)
-                while self._size > _MOST_BYTES:
-                    self._size -= len(self._parts.popleft())
+                self._parts.put(excerpt.text, len(excerpt.text))
 
     def _find(self) -> RunningLaunch:
         running = self._client.running()
@@ -191,20 +182,19 @@ class NodeOutput:
             launch = RunningLaunch(key, status, {})
             if launch.find(self._name) is not None:
                 return launch
-            for one in status.nodes:
-                if self._name in one.members:
+            for node in status.nodes:
+                if self._name in node.members:
                     raise NotFoundError(
-                        f"'{self._name}' is in container '{one.name}': its output is that of the"
+                        f"'{self._name}' is in container '{node.name}': its output is that of the"
                         " container"
                     )
         raise NotFoundError(f"no launch runs '{self._name}'")
 
     def take(self) -> str:
-        """Return and forget what has come since the last call."""
+        """Return and forget the output since the last call."""
         with self._lock:
             text = "".join(self._parts)
             self._parts.clear()
-            self._size = 0
         return text
 
     def close(self) -> None:

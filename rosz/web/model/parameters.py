@@ -4,34 +4,29 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import TYPE_CHECKING
 
+from rosz.access import PagePolicy
 from rosz.errors import ParamError, UsageError
+from rosz.node import Node
 from rosz.params import Value, condense, joined, spread, type_name
 from rosz.params.replica import Changed
 from rosz.params.yaml import dump, inline, load, load_documents
-from rosz.web.model.permission import Permission
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("Parameters",)
 
 _MOST_CHANGES = 200
 
 
-class Parameters:
+class ParameterModel:
     """The parameters of all nodes, and their newest changes, until it is closed.
 
     Args:
         node: The node that reads and writes them.
-        permission: What the page may change.
+        permission: The changes that the page may make.
 
     Attributes:
         version: Number that grows with each change.
     """
 
-    def __init__(self, node: Node, permission: Permission) -> None:
+    def __init__(self, node: Node, permission: PagePolicy) -> None:
         self.version: int = 0
         self._params = node.params
         self._permission = permission
@@ -51,14 +46,14 @@ class Parameters:
 
     def values(self) -> dict[str, Value]:
         """Return the value of each parameter that is not a namespace, by full name."""
-        found: dict[str, Value] = {}
+        tree: dict[str, Value] = {}
         for name in self._params.names():
             if self._permission.objection("get", name):
                 continue
             value = self._params.get(name, None)
             if value is not None:
-                found[name] = value
-        return found
+                tree[name] = value
+        return tree
 
     def set_text(self, name: str, text: str, *, other_type: bool = False) -> None:
         """Set a parameter to a value in YAML.

@@ -6,17 +6,13 @@ import importlib.util
 import secrets
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz.errors import MessageError, UsageError
+from rosz.introspect import Survey
 from rosz.names import short_type
+from rosz.node import Node
 from rosz.web.model.topic import TopicWatch
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("IMAGE_TYPES", "ImageWatch", "Pictures", "Source")
 
 IMAGE_TYPES = frozenset({"sensor_msgs/Image", "sensor_msgs/CompressedImage"})
 _LIBRARY = "pictures need libraries: pip install 'rosz[vision]'"
@@ -25,7 +21,7 @@ Source = Callable[[], tuple[bytes, str]]
 """Function that returns a picture and its media type."""
 
 
-class Pictures:
+class PictureSources:
     """The sources of the pictures that pages show, by secret keys."""
 
     def __init__(self) -> None:
@@ -55,17 +51,9 @@ class Pictures:
 
 
 class ImageWatch(TopicWatch):
-    """The newest image of a topic.
-
-    Args:
-        node: The node that subscribes to it.
-        survey: The running nodes.
-        topic: Full name of the topic.
+    """The newest image of a topic; the arguments are those of `TopicWatch`.
 
     Raises:
-        NotFoundError: The topic does not exist.
-        TypeNotFound: Its type is not known here.
-        DefinitionError: Its definition differs from the one here.
         UsageError: Its messages are not images, or a library is not installed.
     """
 
@@ -97,7 +85,7 @@ class ImageWatch(TopicWatch):
         return data.tobytes(), "image/png" if form == ".png" else "image/jpeg"
 
     def _pixels(self) -> Any:
-        from rosz.bags.images import pixels
+        from rosz.images import pixels
 
         message = self.message()
         if message is None:
@@ -119,15 +107,15 @@ class ImageWatch(TopicWatch):
         Raises:
             MessageError: The message is not an image.
         """
-        from rosz.ros1.cv_bridge import CvBridge, CvBridgeError
+        from rosz.images import ImageError, image_array
 
         message = self.message()
         if message is None:
             return ""
         try:
             raw = not hasattr(message, "format")
-            image = CvBridge().imgmsg_to_cv2(message) if raw else self._pixels()
-        except CvBridgeError as error:
+            image = image_array(message) if raw else self._pixels()
+        except ImageError as error:
             raise MessageError(f"the message is not an image: {error}") from error
         height, width = image.shape[:2]
         if not (0 <= x < width and 0 <= y < height):

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 import threading
 import time
 from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosz.errors import RoszError, UsageError
-from rosz.introspect.fields import FieldPath, find_target
-from rosz.introspect.subscribe import topic_types
+from rosz.introspect import FieldPath, Survey, find_target, topic_types
 from rosz.message import slot_type, slots
+from rosz.node import Node
 from rosz.time import DurationValue, TimeValue
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("Plot", "Series", "plottable_fields", "split_fields")
 
 _MOST_POINTS = 60_000
 _SPARE_POINTS = 6_000
@@ -30,36 +25,22 @@ _DEEPEST = 6
 _MOST_FIELDS = 200
 _MOST_ELEMENTS = 50
 _QUEUE = 200
+_COLON = re.compile(r":(?![^\[]*\])")
+"""A colon that is not in an index."""
 
 
 def split_fields(text: str) -> list[str]:
     """Return the fields that a text names; ``/pose/x:y`` stands for two, as in rqt_plot."""
-    found: list[str] = []
+    fields: list[str] = []
     for word in text.replace(",", " ").split():
-        first, *others = _parts(word)
-        found.append(first)
-        found += [f"{first.rpartition('/')[0]}/{one}" for one in others]
-    return list(dict.fromkeys(found))
-
-
-def _parts(word: str) -> list[str]:
-    """Split at colons that are not in an index."""
-    parts, depth = [""], 0
-    for letter in word:
-        depth += (letter == "[") - (letter == "]")
-        if letter == ":" and not depth:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    return [one for one in parts if one] or [word]
+        first, *others = [part for part in _COLON.split(word) if part] or [word]
+        fields.append(first)
+        fields += [f"{first.rpartition('/')[0]}/{other}" for other in others]
+    return list(dict.fromkeys(fields))
 
 
 class Series:
-    """The newest points of one field; safe to use from several threads.
-
-    Args:
-        name: The field, with its topic.
-    """
+    """The newest points of one field; safe to use from several threads."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -74,12 +55,7 @@ class Series:
         return times[-1] if times else 0.0
 
     def add(self, moment: float, value: float) -> None:
-        """Add a point; one that is older than the newest begins the series again.
-
-        Args:
-            moment: Time in seconds since the Unix epoch.
-            value: The value.
-        """
+        """Add a point at a time in seconds; one that is older begins the series again."""
         with self._lock:
             if self._times and moment < self._times[-1]:
                 self._times.clear()
@@ -97,13 +73,7 @@ class Series:
             return self._times[first:last], self._values[first:last]
 
     def within(self, begin: float, end: float, most: int) -> list[tuple[float, float]]:
-        """Return points from one time to another; of many, the lowest and highest of each part.
-
-        Args:
-            begin: Time in seconds since the Unix epoch.
-            end: The same.
-            most: Largest number of points.
-        """
+        """Return points from one time to another; of many, the lowest and highest of each part."""
         times, values = self.points(begin, end)
         if len(times) <= most:
             return list(zip(times, values, strict=True))
@@ -121,12 +91,7 @@ def _extremes(values: list[float], start: int, end: int) -> list[int]:
 
 
 def plottable_fields(cls: type[Any], depth: int = 0) -> Iterator[str]:
-    """Yield the fields of a message class that can be plotted, such as ``pose/x``.
-
-    Args:
-        cls: The class.
-        depth: Number of messages that it is in.
-    """
+    """Yield the fields of a class that can be plotted, such as ``pose/x``, at a depth."""
     for slot in slots(cls):
         kind = slot_type(slot).partition("[")[0]
         if "/" not in kind:
@@ -171,8 +136,8 @@ def _numbers(name: str, value: Any) -> Iterator[tuple[str, float]]:
     elif isinstance(value, TimeValue | DurationValue):
         yield name, value.to_sec()
     elif isinstance(value, list | tuple | array | bytes):
-        for number, one in enumerate(value[:_MOST_ELEMENTS]):
-            yield from _numbers(f"{name}[{number}]", one)
+        for number, item in enumerate(value[:_MOST_ELEMENTS]):
+            yield from _numbers(f"{name}[{number}]", item)
 
 
 class Plot:
@@ -221,15 +186,15 @@ class Plot:
 
     def offered(self, survey: Survey) -> dict[str, list[str]]:
         """Return the fields that can be plotted, by topic; topics of unknown types have none."""
-        found: dict[str, list[str]] = {}
+        by_topic: dict[str, list[str]] = {}
         for topic, types in topic_types(survey.view).items():
             try:
                 cls = self._node.context.types.message(types[0])
             except RoszError:
                 continue
             if fields := list(itertools.islice(plottable_fields(cls), _MOST_FIELDS)):
-                found[topic] = fields
-        return dict(sorted(found.items()))
+                by_topic[topic] = fields
+        return dict(sorted(by_topic.items()))
 
     def remove(self, name: str) -> None:
         """Plot a field no longer."""
@@ -239,8 +204,9 @@ class Plot:
             if feed is None:
                 return
             feed.paths.pop(name, None)
-            for key in [one for one in feed.series if one == name or one.startswith(f"{name}[")]:
-                del feed.series[key]
+            for key in list(feed.series):
+                if key == name or key.startswith(f"{name}["):
+                    del feed.series[key]
             if not feed.paths:
                 del self._feeds[topic]
                 feed.close()
@@ -250,15 +216,16 @@ class Plot:
         with self._lock:
             feeds = list(self._feeds.values())
         return sorted(
-            (one for feed in feeds for one in feed.series.copy().values()), key=lambda one: one.name
+            (line for feed in feeds for line in feed.series.copy().values()),
+            key=lambda line: line.name,
         )
 
     def table(self) -> str:
         """Return all points as CSV: time, field, value."""
         lines = ["time,field,value"]
-        for one in self.series():
-            times, values = one.points()
-            lines += [f"{t:.6f},{one.name},{v!r}" for t, v in zip(times, values, strict=True)]
+        for line in self.series():
+            times, values = line.points()
+            lines += [f"{t:.6f},{line.name},{v!r}" for t, v in zip(times, values, strict=True)]
         return "\n".join([*lines, ""])
 
     def close(self) -> None:

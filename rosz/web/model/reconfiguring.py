@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rosz.access import PagePolicy
+from rosz.node import Node
 from rosz.reconfigure import Client, Config, Description
-from rosz.web.model.permission import Permission
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("Reconfiguration",)
 
 _TIMEOUT = 5.0
 
@@ -22,15 +18,14 @@ class Reconfiguration:
 
     Args:
         node: The node of the page.
-        permission: What the page may change.
+        permission: The changes that the page may make.
         name: Name of the server.
 
     Attributes:
-        name: Name of the server.
         version: Number that grows with each configuration that comes.
     """
 
-    def __init__(self, node: Node, permission: Permission, name: str) -> None:
+    def __init__(self, node: Node, permission: PagePolicy, name: str) -> None:
         self.name = name
         self.version: int = 0
         self._permission = permission

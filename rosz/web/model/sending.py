@@ -1,27 +1,29 @@
-"""Publishing from a page: once, or at a rate until it stops or closes."""
+"""Publishing messages from a page, once or at a rate, and calling services."""
 
 from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rosz.access import PagePolicy
+from rosz.graph import View
+from rosz.introspect import find_server
+from rosz.message import strify_message
+from rosz.node import Node, Publisher
+from rosz.node.ros2 import request_type
 from rosz.web.model.forms import read_form
-from rosz.web.model.permission import Permission
 from rosz.worker import Worker, run_task
 
-if TYPE_CHECKING:
-    from rosz.node import Node, Publisher
-
-__all__ = ("Sending",)
+_TIMEOUT = 30.0
 
 
 class Sending:
-    """Publishes messages of a page on one topic, until it is closed.
+    """Publishes messages of a page on one topic, until closed.
 
     Args:
         node: The node that publishes.
-        permission: What the page may change.
+        permission: The changes that the page may make.
         topic: Full name of the topic.
         type_name: Type of its messages.
 
@@ -31,12 +33,12 @@ class Sending:
         sent: Number of messages that were published.
 
     Raises:
-        InvalidName: The name is not legal.
+        InvalidName: The name of the topic is not legal.
         TypeNotFound: The type does not exist.
-        UsageError: The page may not publish it.
+        UsageError: The page may not publish the topic.
     """
 
-    def __init__(self, node: Node, permission: Permission, topic: str, type_name: str) -> None:
+    def __init__(self, node: Node, permission: PagePolicy, topic: str, type_name: str) -> None:
         self.topic: str = node.resolve(topic)
         self.named: tuple[str, str] = (self.topic, type_name)
         permission.check("publish", self.topic)
@@ -52,7 +54,7 @@ class Sending:
 
     @property
     def repeats(self) -> bool:
-        """Whether it publishes at a rate."""
+        """Whether a message is being published at a rate."""
         return self._message is not None
 
     def send(self, text: str) -> None:
@@ -64,14 +66,14 @@ class Sending:
         """Publish a message at a rate in hertz; errors are those of `read_form`."""
         message = read_form(self._cls, text, self._node.now())
         with self._lock:
-            running, self._message = self._message is not None, message
+            was_repeating, self._message = self._message is not None, message
             self._period = 1 / rate
             self._due = time.monotonic()
-        if not running:
+        if not was_repeating:
             self._worker.submit(self._turn)
 
     def stop(self) -> None:
-        """Publish no more."""
+        """Stop publishing at a rate."""
         with self._lock:
             self._message = None
 
@@ -80,7 +82,7 @@ class Sending:
             message = self._message
             if message is None:
                 return
-            # A turn that comes late does not make the next one early.
+            # Missed turns are dropped, so that no burst follows a late turn.
             self._due = max(self._due + self._period, time.monotonic())
             wait = self._due - time.monotonic()
         self._publisher.publish(message)
@@ -88,7 +90,32 @@ class Sending:
         self._worker.later(wait, self._turn)
 
     def close(self) -> None:
-        """Publish no more, and withdraw the publisher."""
+        """Stop publishing, and close the publisher."""
         self.stop()
         self._worker.close()
         self._publisher.close()
+
+
+def call_service(node: Node, permission: PagePolicy, view: View, name: str, text: str) -> str:
+    """Call a service, and return its response as text.
+
+    Args:
+        node: The node that calls the service.
+        permission: The rights of the page.
+        view: The graph, in which the server is looked up.
+        name: Full name of the service.
+        text: The request in YAML.
+
+    Raises:
+        NotFoundError: No node has the service.
+        UsageError: The text is not YAML, or the page may not call the service.
+        EncodeError: A value does not fit the request.
+        ServiceError: The server raised an error.
+        WaitTimeout: The server did not reply in time.
+    """
+    permission.check("call", name)
+    cls = request_type(node, find_server(view, name))
+    request = read_form(cls.Request, text, node.now())
+    with node.client(name, cls, timeout=_TIMEOUT) as client:
+        response = client.call(request)
+    return strify_message(response) if response.__slots__ else ""

@@ -8,21 +8,14 @@ from typing import Generic, TypeVar
 
 from rosz.lifecycle import Closable
 
-__all__ = ("Shared", "Use")
-
 T = TypeVar("T", bound=Closable)
 
 
 class Use(Generic[T]):
-    """The use of something shared, until it is closed.
+    """The use of something shared, until it is closed."""
 
-    Args:
-        shared: What is used.
-        value: The open thing.
-    """
-
-    def __init__(self, shared: Shared[T], value: T) -> None:
-        self._shared: Shared[T] | None = shared
+    def __init__(self, shared: SharedResource[T], value: T) -> None:
+        self._shared: SharedResource[T] | None = shared
         self.value = value
 
     def close(self) -> None:
@@ -32,23 +25,14 @@ class Use(Generic[T]):
             shared.release()
 
 
-class Shared(Generic[T]):
-    """Something that the first user opens and the last one closes.
-
-    Args:
-        open_one: Function that opens it.
-    """
+class SharedResource(Generic[T]):
+    """Something that the first user opens, by a function, and the last one closes."""
 
     def __init__(self, open_one: Callable[[], T]) -> None:
         self._open = open_one
         self._lock = threading.Lock()
         self._value: T | None = None
         self._users = 0
-
-    @property
-    def users(self) -> int:
-        """Number of users."""
-        return self._users
 
     def use(self) -> Use[T]:
         """Open it, unless it is open, and count a user.

@@ -6,23 +6,26 @@ import operator
 import re
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
 from rosz.errors import DecodeError, UsageError
-from rosz.introspect.fields import FieldPath
-from rosz.introspect.measure import BandwidthMeter, DelayMeter, DelayStats, read_stamp
-from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.introspect import (
+    BandwidthMeter,
+    DelayMeter,
+    DelayStats,
+    FieldPath,
+    Survey,
+    find_class,
+    find_token,
+    read_stamp,
+    topic_types,
+)
 from rosz.message import Message
+from rosz.node import Node
 from rosz.time import DurationValue, TimeValue
 from rosz.web.model.traffic import Flow, flow_of
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("Condition", "TopicWatch", "message_tree")
 
 _QUEUE = 3
 _MOST_ELEMENTS = 30
@@ -41,7 +44,7 @@ _COMPARISON = re.compile(r"([\w/.\[\]:]+)\s*(==|!=|<=|>=|<|>|\bcontains\b)\s*(.+
 _TRUTHS = {"true": 1.0, "false": 0.0}
 
 
-class Condition:
+class FieldCondition:
     """A comparison of a field with a value, such as ``pose/x > 3`` or ``data contains go``.
 
     It is not Python, as that of ``rostopic`` is, since those who see a page may not run programs.
@@ -71,15 +74,15 @@ class Condition:
     def accepts(self, message: Any) -> bool:
         """Return whether a message fulfils it; one without the field does not."""
         try:
-            found = self._path.read(message)
+            value = self._path.read(message)
         except (LookupError, AttributeError):
             return False
-        if isinstance(found, TimeValue | DurationValue):
-            found = found.to_sec()
+        if isinstance(value, TimeValue | DurationValue):
+            value = value.to_sec()
         compare = _OPERATORS[self._operator]
-        if self._operator != "contains" and isinstance(found, int | float):
-            return self._number is not None and compare(found, self._number)
-        return compare(str(found), self._value)
+        if self._operator != "contains" and isinstance(value, int | float):
+            return self._number is not None and compare(value, self._number)
+        return compare(str(value), self._value)
 
 
 class TopicWatch:
@@ -92,7 +95,6 @@ class TopicWatch:
         condition: What messages have to fulfil to be kept; all are counted.
 
     Attributes:
-        topic: Full name of the topic.
         type_name: Its type, ``pkg/msg/Name``.
         received: Number of messages that have come.
 
@@ -103,7 +105,7 @@ class TopicWatch:
     """
 
     def __init__(
-        self, node: Node, survey: Survey, topic: str, condition: Condition | None = None
+        self, node: Node, survey: Survey, topic: str, condition: FieldCondition | None = None
     ) -> None:
         types = topic_types(survey.view).get(topic, ("",))
         token = find_token(survey.view, topic, types[0])
@@ -132,7 +134,7 @@ class TopicWatch:
         if self._condition is None or self._fulfils(self._condition, payload):
             self._payload = payload
 
-    def _fulfils(self, condition: Condition, payload: bytes) -> bool:
+    def _fulfils(self, condition: FieldCondition, payload: bytes) -> bool:
         try:
             return condition.accepts(self._decode(payload))
         except DecodeError:  # which `message` reports of all messages
@@ -147,10 +149,10 @@ class TopicWatch:
         payload = self._payload
         if payload is None:
             return None
-        known = self._message
-        if known is None or known[0] is not payload:
-            known = self._message = payload, self._decode(payload)
-        return known[1]
+        decoded = self._message
+        if decoded is None or decoded[0] is not payload:
+            decoded = self._message = payload, self._decode(payload)
+        return decoded[1]
 
     def flow(self) -> Flow | None:
         """Return rate and bandwidth; None before the second message."""
@@ -170,18 +172,19 @@ def message_tree(value: Any, name: str, path: str = "") -> dict[str, Any]:
     """Return a message, or a value in it, as a tree of dictionaries for a page.
 
     Each has ``id``, a path that stays the same, ``name``, ``value`` as text, and ``children``.
-    Long sequences are cut, with a note of what is left out.
+    Long sequences are cut, with a note of the number left out.
     """
     here = f"{path}/{name}"
     if isinstance(value, Message) and not isinstance(value, TimeValue | DurationValue):
-        children = [message_tree(getattr(value, one), one, here) for one in value.__slots__]
+        children = [message_tree(getattr(value, item), item, here) for item in value.__slots__]
         return {"id": here, "name": name, "value": "", "children": children}
     if isinstance(value, str | bytes | bool | int | float | TimeValue | DurationValue):
         return {"id": here, "name": name, "value": _scalar_text(value)}
     if isinstance(value, msgspec.Struct) or not hasattr(value, "__len__"):
         return {"id": here, "name": name, "value": str(value)}
     first = [
-        message_tree(one, f"[{number}]", here) for number, one in enumerate(value[:_MOST_ELEMENTS])
+        message_tree(item, f"[{number}]", here)
+        for number, item in enumerate(value[:_MOST_ELEMENTS])
     ]
     if len(value) > _MOST_ELEMENTS:
         rest = len(value) - _MOST_ELEMENTS

@@ -5,24 +5,16 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from typing import TYPE_CHECKING
 
 import msgspec
 
+from rosz.access import PagePolicy
 from rosz.errors import DecodeError
-from rosz.introspect.measure import BandwidthMeter, BandwidthStats
-from rosz.introspect.subscribe import subscribe_samples
+from rosz.introspect import BandwidthMeter, BandwidthStats, Survey, subscribe_samples
 from rosz.names import is_of_action, short_type
-from rosz.web.model.permission import Permission
-from rosz.wire import Kind, read_attachment
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Entity, Node
-    from rosz.session import Sample
-    from rosz.wire import Token
-
-__all__ = ("Flow", "Traffic", "flow_of")
+from rosz.node import Entity, Node
+from rosz.session import Sample
+from rosz.wire import Kind, Token, read_attachment
 
 _HEAVY = frozenset(
     {
@@ -59,7 +51,7 @@ class Flow(msgspec.Struct, frozen=True):
 
 
 def flow_of(stats: BandwidthStats | None) -> Flow | None:
-    """Return what flows by what a meter says; None if too little has come."""
+    """Return the flow that a meter measured; None if too few messages have come."""
     if stats is None:
         return None
     rate = stats.bytes_per_second / stats.mean if stats.mean else 0.0
@@ -73,11 +65,7 @@ class _Tap:
         self._meter = BandwidthMeter()
         self._ages: deque[int] = deque(maxlen=_AGES)
         self._entity: Entity = subscribe_samples(
-            node,
-            token.name,
-            token.type_name,
-            token.type_hash,
-            self._receive,
+            node, token.name, token.type_name, token.type_hash, self._receive
         )
 
     def _receive(self, sample: Sample) -> None:
@@ -104,16 +92,16 @@ class Traffic:
 
     Args:
         node: The node that subscribes to them.
-        permission: What the page may do; everything without one.
+        permission: The rights of the page; without it, all.
 
     Attributes:
         everything: Whether to measure topics of large messages, and those of other machines.
     """
 
-    def __init__(self, node: Node, permission: Permission | None = None) -> None:
+    def __init__(self, node: Node, permission: PagePolicy | None = None) -> None:
         self.everything: bool = False
         self._node = node
-        self._permission = permission or Permission()
+        self._permission = permission or PagePolicy()
         self._lock = threading.Lock()
         self._taps: dict[str, _Tap] = {}
         self._seen: tuple[Survey, bool] | None = None
@@ -135,31 +123,22 @@ class Traffic:
                 self._taps[name] = _Tap(self._node, wanted[name])
 
     def _wanted(self, survey: Survey) -> dict[str, Token]:
-        found: dict[str, Token] = {}
+        tokens: dict[str, Token] = {}
         for token in survey.view.entities(Kind.PUBLISHER):
             if token.zid == self._node.context.session.zid or is_of_action(token.name):
                 continue
             if self._permission.objection("subscribe", token.name):
                 continue
-            if self.everything or self.is_light(survey, token):
-                found.setdefault(token.name, token)
-        return found
-
-    def is_light(self, survey: Survey, token: Token) -> bool:
-        """Return whether a publisher is of this machine, and not of a type of large messages."""
-        return (
-            short_type(token.type_name) not in _HEAVY
-            and survey.host(token) == self._node.process.host
-        )
+            is_heavy = short_type(token.type_name) in _HEAVY
+            is_here = survey.host(token) == self._node.process.host
+            if self.everything or (is_here and not is_heavy):
+                tokens.setdefault(token.name, token)
+        return tokens
 
     def flow(self, topic: str) -> Flow | None:
         """Return what flows on a topic; None if it is not measured, or too little has come."""
         tap = self._taps.get(topic)
         return None if tap is None else tap.flow()
-
-    def is_measured(self, topic: str) -> bool:
-        """Return whether a topic is measured."""
-        return topic in self._taps
 
     def close(self) -> None:
         """Measure nothing any more."""

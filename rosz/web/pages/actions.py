@@ -11,14 +11,16 @@ from rosz.web.model import ActionRow, Actions, ActionUse, GoalRow, SentGoal, Sys
 from rosz.web.pages.form import MessageForm
 from rosz.web.pages.layout import (
     Frame,
+    add_table,
     address_of,
+    card,
     column,
     empty_state,
     offer_choice,
     query_of,
+    show_rows,
+    show_text,
 )
-
-__all__ = ("show_actions",)
 
 _LIST_PERIOD = 1.0
 _PERIOD = 0.25
@@ -28,20 +30,10 @@ _COLORS = {"succeeded": "positive", "aborted": "negative", "rejected": "negative
            "recalled": "warning"}  # fmt: skip
 
 
-def show_actions(system: System, action: str) -> None:
-    """Build the page.
+class ActionsPage:
+    """The list of actions, the form for one that the address may name, and the goals."""
 
-    Args:
-        system: The system.
-        action: Action to use; empty for none.
-    """
-    _ActionsPage(system, action)
-
-
-class _ActionsPage:
-    """The list of actions, the form, and the goals."""
-
-    def __init__(self, system: System, action: str) -> None:
+    def __init__(self, system: System, action: str = "") -> None:
         self._system = system
         self._actions: Actions = system.actions
         self._frame = frame = Frame(system, "Actions", "/actions")
@@ -81,13 +73,8 @@ class _ActionsPage:
             column("type", "Type", "rosz-soft"),
             column("servers", "Node", "rosz-wide"),
         ]
-        with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full"):
-            ui.label("Actions").classes("text-base font-semibold")
-            table = (
-                ui.table(rows=[], columns=columns, row_key="name", pagination=12)
-                .classes("w-full")
-                .props("flat dense")
-            )
+        with card("Actions"):
+            table = add_table(columns)
             offer_choice(table, self._choose)
         return table
 
@@ -109,19 +96,18 @@ class _ActionsPage:
                     ui.tooltip("Ends the goals of all clients")
 
     def _list(self) -> None:
-        found = self._actions.rows(self._graph.survey().view)
-        self._rows = {one.name: one for one in found}
+        served = self._actions.rows(self._graph.survey().view)
+        self._rows = {row.name: row for row in served}
         rows = [
             {
-                "name": one.name,
-                "address": query_of("/actions", action=one.name),
-                "type": one.type,
-                "servers": ", ".join(one.servers),
+                "name": row.name,
+                "address": query_of("/actions", action=row.name),
+                "type": row.type,
+                "servers": ", ".join(row.servers),
             }
-            for one in found
+            for row in served
         ]
-        if self._table.rows != rows:
-            self._table.rows = rows
+        show_rows(self._table, rows)
         if self._wanted in self._rows:
             wanted, self._wanted = self._wanted, ""
             ui.timer(0, lambda: self._choose(wanted), once=True)
@@ -160,9 +146,9 @@ class _ActionsPage:
 
     async def _cancel(self, goal_id: str) -> None:
         name, view = self._chosen, self._graph.survey().view
-        said = await self._frame.attempt(lambda: self._actions.cancel(view, name, goal_id))
-        if said is not None:
-            ui.notify(said, type="info")
+        answer = await self._frame.attempt(lambda: self._actions.cancel(view, name, goal_id))
+        if answer is not None:
+            ui.notify(answer, type="info")
 
     def _refresh(self) -> None:
         goals = self._actions.goals(self._chosen)[:_MOST_SHOWN] if self._chosen else []
@@ -173,9 +159,9 @@ class _ActionsPage:
                 with self._goals:
                     self._cards[goal] = _GoalCard(goal, self._cancel)
             self._cards[goal].refresh()
-        own = {one.id for one in goals}
+        own = {goal.id for goal in goals}
         rows = self._use.value.rows() if self._use is not None else []
-        self._others.show([one for one in rows if one.id not in own])
+        self._others.show([row for row in rows if row.id not in own])
 
 
 class _GoalCard:
@@ -214,7 +200,7 @@ class _GoalCard:
         self._card.delete()
 
     def refresh(self) -> None:
-        """Show what has changed."""
+        """Show the changes."""
         goal = self._goal
         if self._ended and self._seen == goal.feedbacks:
             return
@@ -223,9 +209,8 @@ class _GoalCard:
         self._state.props(f"color={_COLORS.get(goal.state, 'info')}")
         self._time.set_text(f"{goal.seconds:.1f} s")
         self._cancel.set_visibility(not goal.done)
-        for label, text in ((self._result, goal.result), (self._fault, goal.fault)):
-            label.set_text(text)
-            label.set_visibility(bool(text))
+        show_text(self._result, goal.result)
+        show_text(self._fault, goal.fault)
         if self._seen != goal.feedbacks:
             self._seen = goal.feedbacks
             texts = goal.feedback()
@@ -243,8 +228,7 @@ class _OtherGoals:
     def __init__(self, cancel: Any) -> None:
         self._cancel = cancel
         self._shown: list[GoalRow] = []
-        with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full") as self._card:
-            ui.label("Other goals of the server").classes("text-base font-semibold")
+        with card("Other goals of the server") as self._card:
             self._rows = ui.column().classes("w-full gap-1")
         self._card.set_visibility(False)
 

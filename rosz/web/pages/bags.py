@@ -1,4 +1,4 @@
-"""The bags of a folder: recording, playing with a transport bar, what is in each, downloads."""
+"""The bags of a folder: recording, playing with a transport bar, contents, downloads."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from urllib.parse import quote
 
 from nicegui import run, ui
 
-from rosz.bags.summary import Summary
+from rosz.bags import Summary
 from rosz.errors import RoszError
-from rosz.introspect.topics import list_topics
+from rosz.introspect import list_topics
 from rosz.web.model import (
     COMPRESSIONS,
     BagCommand,
@@ -21,40 +21,35 @@ from rosz.web.model import (
     RecordOrder,
     System,
 )
+from rosz.web.pages.launches import confirm
 from rosz.web.pages.layout import (
     Frame,
+    add_table,
     address_of,
     bandwidth_text,
+    card,
     column,
+    number_column,
     offer_choice,
     query_of,
+    show_rows,
+    show_text,
     size_text,
 )
-
-__all__ = ("fault_of", "show_bags")
 
 _LIST_PERIOD = 2.0
 _PERIOD = 0.25
 _RATES = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 _FORMATS = {".mcap": "MCAP", ".bag": "ROS 1 (.bag)"}
 _LITTLE_DISK = 1 << 30
+_CLOCK_RATE = 100.0
 _MINUTE, _HOUR = 60, 3600
 
 
-def show_bags(system: System, bag: str) -> None:
-    """Build the page.
+class BagsPage:
+    """The recorder, the player, and the list of bags; the address may name one to show."""
 
-    Args:
-        system: The system.
-        bag: Bag to show; empty for none.
-    """
-    _BagsPage(system, bag)
-
-
-class _BagsPage:
-    """The recorder, the player, and the list of bags."""
-
-    def __init__(self, system: System, bag: str) -> None:
+    def __init__(self, system: System, bag: str = "") -> None:
         self._bags: Bags = system.bags
         self._frame = frame = Frame(system, "Bags", "/bags")
         self._wanted = bag
@@ -68,54 +63,45 @@ class _BagsPage:
                 self._add_list()
             with ui.column().classes("gap-4 min-w-0"):
                 self._contents = _Contents(self._bags, frame, self._list)
+        offer_choice(self._table, self._contents.show)
         ui.timer(_LIST_PERIOD, self._list)
         frame.every(_PERIOD, self._refresh)
 
     def _add_list(self) -> None:
         columns = [
             column("name", "Bag", "break-all whitespace-normal"),
-            column("size", "Size", "rosz-number", align="right", sort="bytes"),
-            column("changed", "Changed", "rosz-number", align="right", sort="stamp"),
+            number_column("size", "Size", sort="bytes"),
+            number_column("changed", "Changed", sort="stamp"),
         ]
-        with ui.column().classes("rosz-card p-4 gap-2 min-w-0 w-full"):
-            ui.label("Bags").classes("text-base font-semibold")
+        with card("Bags"):
             ui.label(str(self._bags.folder.path)).classes("rosz-mono rosz-soft break-all")
             self._fault = ui.label("").classes("text-negative")
             self._empty = ui.label(
                 "No bag is in this folder yet: record one, or start 'rosz web --bags FOLDER'."
             )
             self._empty.classes("rosz-soft").set_visibility(False)
-            self._table = (
-                ui.table(rows=[], columns=columns, row_key="name", pagination=10)
-                .classes("w-full")
-                .props("flat dense")
-            )
+            self._table = add_table(columns, most=10)
             self._table.set_visibility(False)
-            offer_choice(self._table, self._choose)
-
-    async def _choose(self, name: str) -> None:
-        await self._contents.show(name)
 
     async def _list(self) -> None:
         try:
-            found = await run.io_bound(self._bags.folder.rows)
+            listing = await run.io_bound(self._bags.folder.rows)
         except RoszError as error:
             self._fault.set_text(str(error))
             return
         self._fault.set_text("")
         rows = [
             {
-                "name": one.name,
-                "address": query_of("/bags", bag=one.name),
-                "size": size_text(one.size),
-                "bytes": one.size,
-                "changed": _date(one.changed),
-                "stamp": one.changed,
+                "name": row.name,
+                "address": query_of("/bags", bag=row.name),
+                "size": size_text(row.size),
+                "bytes": row.size,
+                "changed": time.strftime("%m-%d %H:%M", time.localtime(row.changed)),
+                "stamp": row.changed,
             }
-            for one in found or ()
+            for row in listing or ()
         ]
-        if self._table.rows != rows:
-            self._table.rows = rows
+        show_rows(self._table, rows)
         self._table.set_visibility(bool(rows))
         self._empty.set_visibility(not rows)
         if self._wanted:
@@ -135,8 +121,7 @@ class _Recorder:
         self._own = system.node.name
         self._frame = frame
         self._graph = frame.use(system.graph)
-        with ui.column().classes("rosz-card p-4 gap-3 min-w-0 w-full"):
-            ui.label("Record").classes("text-base font-semibold")
+        with card("Record", "p-4 gap-3"):
             with ui.column().classes("w-full gap-2") as self._form:
                 self._add_form()
             with ui.column().classes("w-full gap-2") as self._going:
@@ -184,7 +169,10 @@ class _Recorder:
             ui.icon("fiber_manual_record", color="negative", size="20px")
             self._path = ui.label("").classes("font-medium break-all")
             ui.space()
-            ui.button("Stop", icon="stop", on_click=self._stop).props("no-caps")
+            stop = self._bags.stop_recording
+            ui.button("Stop", icon="stop", on_click=lambda: self._frame.attempt(stop)).props(
+                "no-caps"
+            )
         with ui.row().classes("w-full gap-x-6 gap-y-1 rosz-number"):
             self._facts = {
                 name: _fact(name)
@@ -192,32 +180,34 @@ class _Recorder:
             }
 
     def _offer_topics(self) -> None:
-        tokens = (one for one in self._graph.survey().view.tokens if one.node_name != self._own)
-        known = {one.name for one in list_topics(tokens)}
+        tokens = (
+            entry for entry in self._graph.survey().view.tokens if entry.node_name != self._own
+        )
+        names = {entry.name for entry in list_topics(tokens)}
         chosen = self._topics.value or []
-        self._topics.set_options(sorted({*known, *chosen}), value=chosen)
+        self._topics.set_options(sorted({*names, *chosen}), value=chosen)
 
     def _offer_compressions(self) -> None:
-        known = list(COMPRESSIONS[self._format.value])
-        self._compression.set_options(known, value="none")
+        compressions = list(COMPRESSIONS[self._format.value])
+        self._compression.set_options(compressions, value="none")
 
     async def _record(self) -> None:
         suffix = self._format.value
         name = (self._name.value or "").strip() or time.strftime("%Y-%m-%d-%H-%M-%S")
+        size = int((self._split_size.value or 0) * 1e6)
+        duration = round(float(self._split_seconds.value or 0) * 1e9)
         order = RecordOrder(
             name=name if name.endswith(suffix) else name + suffix,
             topics=tuple(self._topics.value or ()),
             exclude=self._exclude.value or "",
             compression=cast("Any", self._compression.value),
-            split_size=int((self._split_size.value or 0) * 1e6),
-            split_seconds=float(self._split_seconds.value or 0),
+            split=bool(size or duration),
+            size=size,
+            duration=duration,
             max_splits=int(self._most.value or 0),
         )
         await self._frame.attempt(lambda: self._bags.record(order))
         self.refresh()
-
-    async def _stop(self) -> None:
-        await self._frame.attempt(self._bags.stop_recording)
 
     def refresh(self) -> None:
         """Show how it goes."""
@@ -225,8 +215,8 @@ class _Recorder:
         going = recording is not None and not recording.ended
         self._form.set_visibility(not going)
         self._going.set_visibility(going)
-        _set(self._said, _said(recording))
-        _set(self._fault, fault_of(recording))
+        show_text(self._said, _said(recording))
+        show_text(self._fault, fault_of(recording))
         if recording is None:
             return
         last = recording.last
@@ -242,12 +232,9 @@ class _Recorder:
         for name, text in texts.items():
             self._facts[name].set_text(text)
         little = 0 < last.left < _LITTLE_DISK
-        self._facts["Lost"].classes(
-            add="text-negative" if last.lost else "", remove="" if last.lost else "text-negative"
-        )
-        self._facts["Disk left"].classes(
-            add="text-negative" if little else "", remove="" if little else "text-negative"
-        )
+        for name, is_bad in (("Lost", last.lost), ("Disk left", little)):
+            change = "add" if is_bad else "remove"
+            self._facts[name].classes(**{change: "text-negative"})
 
 
 class _Transport:
@@ -275,7 +262,7 @@ class _Transport:
                 self._button("stop", "Stop", "stop")
                 self._rate = (
                     ui.select(
-                        {one: f"{one:g} x" for one in _RATES},
+                        {rate: f"{rate:g} x" for rate in _RATES},
                         value=1.0,
                         on_change=lambda event: self._change("rate", event.value),
                     )
@@ -311,7 +298,7 @@ class _Transport:
         playing: BagRun | None = self._bags.playing
         going = playing is not None and not playing.ended
         self._card.set_visibility(going)
-        _set(self._fault, fault_of(playing))
+        show_text(self._fault, fault_of(playing))
         if playing is None or not going:
             return
         last, order = playing.last, playing.order.play
@@ -322,18 +309,18 @@ class _Transport:
         if not self._dragged:
             self._slider.set_value(last.seconds)
         if last.path and self._rate.value != last.rate:
-            options = {one: f"{one:g} x" for one in sorted({*_RATES, last.rate})}
+            options = {rate: f"{rate:g} x" for rate in sorted({*_RATES, last.rate})}
             self._rate.set_options(options, value=last.rate)
         self._loop.set_value(last.loop)
         self._own = False
         self._time.set_text(f"{_clock(last.seconds)} / {_clock(last.duration)}")
         self._pause.props(f"icon={'play_arrow' if last.paused else 'pause'}")
         self._step.set_enabled(last.paused)
-        _set(self._said, playing.lines[-1] if playing.lines else "")
+        show_text(self._said, playing.lines[-1] if playing.lines else "")
 
 
 class _Contents:
-    """One bag: what is in it, and what to do with it."""
+    """One bag: its contents, and the buttons for it."""
 
     def __init__(self, bags: Bags, frame: Frame, changed: Callable[[], Any]) -> None:
         self._bags = bags
@@ -352,10 +339,10 @@ class _Contents:
             ui.label(name).classes("text-base font-semibold break-all")
             ui.spinner()
         try:
-            found = await run.io_bound(lambda: self._bags.folder.summary(name))
+            summary = await run.io_bound(lambda: self._bags.folder.summary(name))
             fault = ""
         except RoszError as error:
-            found, fault = None, str(error)
+            summary, fault = None, str(error)
         if self._name != name:
             return
         self._card.clear()
@@ -363,15 +350,15 @@ class _Contents:
             ui.label(name).classes("text-base font-semibold break-all")
             if fault:
                 ui.label(fault).classes("text-negative break-words").props("role=alert")
-            if found is not None:
-                for problem in found[1]:
+            if summary is not None:
+                for problem in summary[1]:
                     ui.label(problem).classes("text-negative break-words text-sm")
-                self._add_facts(found[0])
-                self._add_play(found[0])
+                self._add_facts(summary[0])
+                self._add_play(summary[0])
             self._add_buttons(name)
 
     def _add_facts(self, summary: Summary) -> None:
-        compression = ", ".join(dict.fromkeys(one.name for one in summary.compressions)) or "none"
+        compression = ", ".join(dict.fromkeys(kind.name for kind in summary.compressions)) or "none"
         facts = {
             "Begin": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(summary.start)),
             "Duration": _clock(summary.duration),
@@ -394,8 +381,8 @@ class _Contents:
              "classes": "rosz-number"},
         ]  # fmt: skip
         rows = [
-            {"topic": one.topic, "type": one.type, "messages": one.messages}
-            for one in summary.topics
+            {"topic": entry.topic, "type": entry.type, "messages": entry.messages}
+            for entry in summary.topics
         ]
         self._table = (
             ui.table(
@@ -425,14 +412,14 @@ class _Contents:
             )
 
     async def _play(self) -> None:
-        chosen = [one["topic"] for one in self._table.selected]
+        chosen = [row["topic"] for row in self._table.selected]
         order = PlayOrder(
             name=self._name,
             topics=() if len(chosen) == len(self._table.rows) else tuple(chosen),
             prefix=(self._prefix.value or "").strip(),
             paused=self._paused.value,
             loop=self._loop.value,
-            clock=self._clock.value,
+            clock=_CLOCK_RATE if self._clock.value else 0.0,
         )
         if not chosen:
             ui.notify("choose a topic to play", type="warning")
@@ -441,14 +428,7 @@ class _Contents:
 
     async def _question(self) -> None:
         name = self._name
-        with ui.dialog() as dialog, ui.card():
-            ui.label(f"Delete '{name}'? It cannot be brought back.").classes("break-all")
-            with ui.row().classes("w-full justify-end gap-2"):
-                ui.button("Keep it", on_click=lambda: dialog.submit(False)).props("no-caps flat")
-                ui.button("Delete it", on_click=lambda: dialog.submit(True)).props(
-                    "no-caps color=negative"
-                )
-        if not await dialog:
+        if not await confirm(f"Delete '{name}'?", "It cannot be brought back.", "delete it"):
             return
         if await self._frame.attempt(lambda: self._bags.delete(name)):
             self._card.clear()
@@ -459,7 +439,7 @@ class _Contents:
 
 
 def _said(recording: BagRun | None) -> str:
-    """Return what a recording said last, or how it ended."""
+    """Return the last line of a recording, or how it ended."""
     if recording is None or recording.fault:
         return ""
     if recording.ended:
@@ -469,7 +449,7 @@ def _said(recording: BagRun | None) -> str:
 
 
 def fault_of(run: BagRun | None) -> str:
-    """Return what is wrong with a recorder or player; empty if nothing is."""
+    """Return the error of a recorder or player; empty without one."""
     if run is None:
         return ""
     if run.silent:
@@ -485,15 +465,6 @@ def _fact(name: str) -> ui.label:
     with ui.column().classes("gap-0"):
         ui.label(name).classes("rosz-soft text-xs")
         return ui.label("")
-
-
-def _set(label: ui.label, text: str) -> None:
-    label.set_text(text)
-    label.set_visibility(bool(text))
-
-
-def _date(stamp: float) -> str:
-    return time.strftime("%m-%d %H:%M", time.localtime(stamp))
 
 
 def _clock(seconds: float) -> str:

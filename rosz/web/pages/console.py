@@ -10,12 +10,9 @@ import msgspec
 from nicegui import ui
 
 from rosz.errors import UsageError
-from rosz.introspect.nodes import find_nodes, get_levels, set_level
-from rosz.introspect.rosout import LogFilter, LogLine, format_line
+from rosz.introspect import LogFilter, LogLine, find_nodes, format_line, get_levels, set_level
 from rosz.web.model import System
-from rosz.web.pages.layout import Frame, address_of, column, empty_state, query_of
-
-__all__ = ("Wanted", "show_console")
+from rosz.web.pages.layout import Frame, address_of, column, empty_state, query_of, tool_button
 
 _PERIOD = 0.5
 _MOST = 300
@@ -33,16 +30,8 @@ _PICK_NODE = """(event, row) => {
 }"""
 
 
-class Wanted(msgspec.Struct, frozen=True):
-    """The lines that a page shows.
-
-    Attributes:
-        node: Node or namespace; empty for all.
-        level: The lowest level.
-        pattern: Pattern in the text.
-        begin: Time of today from which on, such as ``14:05`` or ``14:05:30``; empty for all.
-        end: Time of today up to which.
-    """
+class _Wanted(msgspec.Struct, frozen=True):
+    """The lines that a page shows."""
 
     node: str = ""
     level: str = "DEBUG"
@@ -56,39 +45,45 @@ class Wanted(msgspec.Struct, frozen=True):
         A text that is not a time sets no limit.
         """
         today = dt.datetime.now().astimezone()
-        found = [0.0, math.inf]
+        bounds = [0.0, math.inf]
         for number, text in enumerate((self.begin, self.end)):
             try:
                 clock = dt.time.fromisoformat(text)
             except ValueError:
                 continue
-            found[number] = dt.datetime.combine(today, clock, today.tzinfo).timestamp()
-        return found[0], found[1]
+            bounds[number] = dt.datetime.combine(today, clock, today.tzinfo).timestamp()
+        return bounds[0], bounds[1]
 
 
-def show_console(system: System, wanted: Wanted) -> None:
-    """Build the page.
+class ConsolePage:
+    """The table of lines with its filter.
 
     Args:
         system: The system.
-        wanted: The lines that it shows at first.
+        node: Node or namespace; empty for all.
+        level: The lowest level.
+        pattern: Pattern in the text.
+        begin: Time of today from which on, such as ``14:05`` or ``14:05:30``; empty for all.
+        end: Time of today up to which.
     """
-    if wanted.level not in _LEVELS:
-        wanted = msgspec.structs.replace(wanted, level="DEBUG")
-    _Console(system, wanted)
 
-
-class _Console:
-    """The table of lines with its filter."""
-
-    def __init__(self, system: System, wanted: Wanted) -> None:
+    def __init__(
+        self,
+        system: System,
+        node: str = "",
+        level: str = "DEBUG",
+        pattern: str = "",
+        begin: str = "",
+        end: str = "",
+    ) -> None:
         self._system = system
         self._frame = frame = Frame(system, "Console", "/console")
         if objection := system.permission.objection("subscribe", "/rosout"):
             frame.show_fault(objection)
             return
         self._graph, self._book = frame.use(system.graph), frame.use(system.console)
-        self._choice = wanted
+        lowest = level if level in _LEVELS else "DEBUG"
+        self._choice = _Wanted(node, lowest, pattern, begin, end)
         self._wanted = self._make_filter()
         self._until: int | None = None
         self._shown: object = None
@@ -128,31 +123,21 @@ class _Console:
                 )
                 self._inputs[field].props(f"dense debounce=300 {props}").classes("w-28")
             ui.space()
-            self._pause = ui.button("Pause", icon="pause", on_click=self._toggle).props(
-                "flat dense no-caps"
-            )
-            ui.button("Clear", icon="delete_sweep", on_click=self._clear).props(
-                "flat dense no-caps"
-            )
-            ui.button("Save", icon="download", on_click=self._save).props("flat dense no-caps")
-            ui.button("Levels", icon="tune", on_click=self._show_levels).props("flat dense no-caps")
+            self._pause = tool_button("Pause", "pause", self._toggle)
+            tool_button("Clear", "delete_sweep", self._clear)
+            tool_button("Save", "download", self._save)
+            tool_button("Levels", "tune", self._show_levels)
 
     def _add_table(self) -> ui.table:
-        table = (
-            ui.table(
-                rows=[],
-                columns=[
-                    column("level", "Level"),
-                    column("text", "Message"),
-                    column("node", "Node", "rosz-wide"),
-                    column("time", "Time", "rosz-wide rosz-number"),
-                    column("place", "Place", "rosz-wide rosz-soft"),
-                ],
-                row_key="id",
-            )
-            .classes("rosz-card w-full")
-            .props('flat dense virtual-scroll :rows-per-page-options="[0]"')
-        )
+        columns = [
+            column("level", "Level"),
+            column("text", "Message"),
+            column("node", "Node", "rosz-wide"),
+            column("time", "Time", "rosz-wide rosz-number"),
+            column("place", "Place", "rosz-wide rosz-soft"),
+        ]
+        table = ui.table(rows=[], columns=columns, row_key="id").classes("rosz-card w-full")
+        table.props('flat dense virtual-scroll :rows-per-page-options="[0]"')
         table.style("max-height: calc(100vh - 220px)")
         table.add_slot("body-cell-level", _LEVEL_CELL)
         table.add_slot("body-cell-text", _TEXT_CELL)
@@ -170,7 +155,7 @@ class _Console:
         given = {
             name: value
             for name, value in msgspec.structs.asdict(self._choice).items()
-            if value != getattr(Wanted(), name)
+            if value != getattr(_Wanted(), name)
         }
         address_of(query_of("/console", **given))
         self._shown = None
@@ -182,12 +167,12 @@ class _Console:
         name = choice.node.strip()
         nodes = (name if name.startswith("/") else f"/{name}",) if name else ()
         try:
-            found = LogFilter(nodes, choice.level, choice.pattern)
+            log_filter = LogFilter(nodes, choice.level, choice.pattern)
         except UsageError as error:
             self._frame.show_fault(str(error))
             return LogFilter(nodes, choice.level)
         self._frame.show_fault("")
-        return found
+        return log_filter
 
     def _toggle(self) -> None:
         self._until = self._book.received if self._until is None else None
@@ -230,13 +215,8 @@ class _Console:
         ui.download.content("\n".join([*lines, ""]), "console.txt")
 
     def _show_levels(self) -> None:
-        nodes = sorted(
-            {
-                one.node
-                for one in self._graph.survey().processes.values()
-                if one.node != self._system.node.name
-            }
-        )
+        processes = self._graph.survey().processes.values()
+        nodes = sorted({process.node for process in processes} - {self._system.node.name})
         with ui.dialog(value=True), ui.card().classes("rosz-card w-96"):
             ui.label("Levels of loggers").classes("text-base font-semibold")
             if not nodes:
@@ -268,7 +248,7 @@ class _Console:
 
     async def _set_level(self, name: str, logger: str, level: str) -> None:
         def act() -> None:
-            self._system.permission.check_control(name)
+            self._system.permission.check_control(f"control '{name}'")
             for node in find_nodes(self._graph.survey(), name):
                 set_level(self._system.node.context.session, node, logger, level)
 

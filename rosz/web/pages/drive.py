@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from urllib.parse import urlencode
-
 from nicegui import ui
-from nicegui.events import GenericEventArguments, JoystickEventArguments, KeyEventArguments
+from nicegui.events import GenericEventArguments, KeyEventArguments
 
 from rosz.errors import RoszError
-from rosz.introspect.topics import list_topics
+from rosz.introspect import list_topics
 from rosz.turtlesim import fetch
-from rosz.web.model import Driver, FloorPlan, System, find_floor
-from rosz.web.pages.layout import Frame, address_of
-
-__all__ = ("show_drive",)
+from rosz.web.model import FloorPlan, System, VelocityPublisher, find_floor
+from rosz.web.pages.layout import Frame, add_select, address_of, card, offer_options, query_of
 
 _LIST_PERIOD = 1.0
 _PICTURE_PERIOD = 0.1
@@ -47,54 +43,38 @@ if (!window.roszDrives) {
 }"""
 
 
-def show_drive(system: System, topic: str) -> None:
-    """Build the page.
+class DrivePage:
+    """The pad, the keys and the picture; the topic is the first with a listener if it is empty."""
 
-    Args:
-        system: The system.
-        topic: Topic of the velocities; empty for the first that somebody listens to.
-    """
-    _Drive(system, topic)
-
-
-class _Drive:
-    """The pad, the keys and the picture."""
-
-    def __init__(self, system: System, topic: str) -> None:
+    def __init__(self, system: System, topic: str = "") -> None:
         self._system = system
-        self._frame = frame = Frame(system, "Drive", "/drive")
+        frame = Frame(system, "Drive", "/drive")
         self._graph = frame.use(system.graph)
-        self._driver: Driver | None = None
+        self._driver: VelocityPublisher | None = None
         self._held: set[str] = set()
         self._picture = system.pictures.add(self._take)
         self._number = 0
         self._floor: FloorPlan | None = None
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-4 px-3 py-2"):
-                self._select = (
-                    ui.select(
-                        [topic] if topic else [],
-                        value=topic or None,
-                        label="Topic (Twist)",
-                        with_input=True,
-                        new_value_mode="add-unique",
-                        on_change=self._choose,
-                    )
-                    .props("dense options-dense")
-                    .classes("grow min-w-52")
+                self._select = add_select(
+                    "Topic (Twist)",
+                    topic,
+                    self._choose,
+                    with_input=True,
+                    new_value_mode="add-unique",
                 )
-                self._speed = ui.number("m/s", value=1.0, min=0.01, step=0.1).props("dense")
-                self._speed.classes("w-20")
-                self._rate = ui.number("rad/s", value=1.5, min=0.01, step=0.1).props("dense")
-                self._rate.classes("w-20")
+                self._select.classes("grow min-w-52")
+                self._speed, self._rate = (
+                    ui.number(unit, value=speed, min=0.01, step=0.1).props("dense").classes("w-20")
+                    for unit, speed in (("m/s", 1.0), ("rad/s", 1.5))
+                )
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
                 self._add_pad()
-                with ui.column().classes("rosz-card p-4 gap-2 min-w-0") as self._floor_card:
-                    ui.label("From above").classes("text-base font-semibold")
+                with card("From above") as self._floor_card:
                     self._floor_text = ui.label("").classes("rosz-soft text-sm")
                     self._floor_picture = ui.html("", sanitize=False).classes("w-full")
-                with ui.column().classes("rosz-card p-4 gap-2 min-w-0") as self._card:
-                    ui.label("turtlesim").classes("text-base font-semibold")
+                with card("turtlesim") as self._card:
                     self._image = ui.interactive_image().classes("w-full")
         ui.keyboard(on_key=self._key, repeating=False)
         ui.on("rosz-alive", self._live)
@@ -117,7 +97,7 @@ class _Drive:
                 color="#2456c8",
                 size=120,
                 throttle=0.05,
-                on_move=self._pull,
+                on_move=lambda event: self._go(float(event.y or 0), -float(event.x or 0)),
                 on_end=self._release,
             ).classes("w-64 h-64 rounded-full").style("background-color: var(--rosz-line)")
             self._state = ui.label("It stands.").classes("rosz-number")
@@ -127,6 +107,9 @@ class _Drive:
         """Stop driving."""
         self._system.pictures.remove(self._picture)
         self._close_floor()
+        self._close_driver()
+
+    def _close_driver(self) -> None:
         driver, self._driver = self._driver, None
         if driver is not None:
             driver.close()
@@ -138,16 +121,13 @@ class _Drive:
 
     def _list(self) -> None:
         survey = self._graph.survey()
-        found = sorted(
-            one.name
-            for one in list_topics(survey.view.tokens)
-            if _TWIST in one.types and one.subscribers
-        )
-        chosen = self._select.value
-        options = sorted({*found, *((chosen,) if chosen else ())})
-        if self._select.options != options:
-            self._select.set_options(options, value=chosen)
-        if not chosen and options:
+        topics = [
+            entry.name
+            for entry in list_topics(survey.view.tokens)
+            if _TWIST in entry.types and entry.subscribers
+        ]
+        options = offer_options(self._select, topics)
+        if not self._select.value and options:
             self._select.set_value(options[0])
         turtles = any("turtlesim/srv/Spawn" in types for types in survey.view.services().values())
         self._card.set_visibility(turtles)
@@ -165,19 +145,16 @@ class _Drive:
 
     def _show_floor(self) -> None:
         picture = "" if self._floor is None else self._floor.picture()
-        if self._floor_picture.content != picture:
-            self._floor_picture.set_content(picture)
+        self._floor_picture.set_content(picture)
 
     def _choose(self) -> None:
         topic = str(self._select.value or "")
-        driver, self._driver = self._driver, None
-        if driver is not None:
-            driver.close()
+        self._close_driver()
         if not topic:
             return
-        address_of(f"/drive?{urlencode({'topic': topic}, safe='/')}")
+        address_of(query_of("/drive", topic=topic))
         try:
-            self._driver = Driver(self._system.node, self._system.permission, topic)
+            self._driver = VelocityPublisher(self._system.node, self._system.permission, topic)
             self._fault.set_text("")
         except RoszError as error:
             self._fault.set_text(str(error))
@@ -195,9 +172,6 @@ class _Drive:
         moving = forward or turn
         self._state.set_text(f"{forward:+.2f} m/s, {turn:+.2f} rad/s" if moving else "It stands.")
 
-    def _pull(self, event: JoystickEventArguments) -> None:
-        self._go(float(event.y or 0), -float(event.x or 0))
-
     def _tilt(self, event: GenericEventArguments) -> None:
         right, back = event.args
         self._go(-float(back), -float(right))
@@ -214,7 +188,7 @@ class _Drive:
             self._held.add(name)
         else:
             self._held.discard(name)
-        self._go(sum(_KEYS[one][0] for one in self._held), sum(_KEYS[one][1] for one in self._held))
+        self._go(sum(_KEYS[key][0] for key in self._held), sum(_KEYS[key][1] for key in self._held))
 
     def _take(self) -> tuple[bytes, str]:
         context = self._system.node.context

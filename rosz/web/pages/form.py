@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nicegui import ui
 from nicegui.elements.mixins.value_element import ValueElement
 
+from rosz.node import Node
 from rosz.web.model import Form, FormField
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("MessageForm",)
+from rosz.web.pages.layout import show_text
 
 _FEW = 12
 """Number of fields up to which a form shows all of them at once."""
 
 
 class MessageForm:
-    """The form of one message, which is empty until it has a type.
-
-    Args:
-        node: Node of the page, which knows the time.
-        label: Label of the YAML text.
-    """
+    """The form of one message, which is empty until it has a type; the node knows the time."""
 
     def __init__(self, node: Node, label: str) -> None:
         self._node = node
@@ -52,7 +44,7 @@ class MessageForm:
         self._editors.clear()
         self._box.clear()
         self._set_text("")
-        self._say("")
+        show_text(self._fault, "")
 
     def show(self, cls: type[Any]) -> None:
         """Show the fields of a message class with their default values."""
@@ -61,7 +53,7 @@ class MessageForm:
         with self._box:
             if not form.fields:
                 ui.label("It has no fields.").classes("rosz-soft")
-            self._add(form.fields, opened=sum(one.size for one in form.fields) <= _FEW)
+            self._add(form.fields, opened=sum(field.size for field in form.fields) <= _FEW)
         self._set_text(form.text)
 
     def _add(self, fields: tuple[FormField, ...], *, opened: bool) -> None:
@@ -83,7 +75,7 @@ class MessageForm:
             nonlocal built
             if built or not group.value:
                 return
-            built = True  # what is never opened costs nothing
+            built = True  # a part that is never opened costs nothing
             with group, ui.column().classes("w-full gap-0 rosz-indent"):
                 self._add(field.fields, opened=opened)
 
@@ -109,26 +101,19 @@ class MessageForm:
         def change(event: Any) -> None:
             self._change(field, event.value)
 
+        editor: ValueElement[Any]
         if field.kind == "bool":
             return ui.switch(value=bool(value), on_change=change).props("dense")
         if field.kind == "choice":
-            return (
-                ui.select(_options(field, value), value=value, on_change=change)
-                .props("dense options-dense")
-                .classes("grow min-w-0")
-            )
-        if field.kind in ("integer", "number"):
-            return (
-                ui.number(value=value, min=field.low, max=field.high, on_change=change)
-                .props("dense step=any" if field.kind == "number" else "dense")
-                .classes("grow min-w-0")
-            )
-        style = "input-class=rosz-mono" if field.kind == "yaml" else ""
-        return (
-            ui.input(value=str(value), on_change=change)
-            .props(f"dense {style}")
-            .classes("grow min-w-0")
-        )
+            editor = ui.select(_options(field, value), value=value, on_change=change)
+            editor.props("options-dense")
+        elif field.kind in ("integer", "number"):
+            editor = ui.number(value=value, min=field.low, max=field.high, on_change=change)
+            editor.props("step=any" if field.kind == "number" else "")
+        else:
+            editor = ui.input(value=str(value), on_change=change)
+            editor.props("input-class=rosz-mono" if field.kind == "yaml" else "")
+        return editor.props("dense").classes("grow min-w-0")
 
     # From the fields to the text, and back.
 
@@ -136,7 +121,7 @@ class MessageForm:
         if self._own or self._form is None or value is None:
             return
         fault = self._form.change(field, value, self._node.now())
-        self._say(fault)
+        show_text(self._fault, fault)
         if not fault:
             self._set_text(self._form.text)
 
@@ -144,7 +129,7 @@ class MessageForm:
         if self._own or self._form is None:
             return
         self._form.write(text, self._node.now())
-        self._say(self._form.fault)
+        show_text(self._fault, self._form.fault)
         if not self._form.fault:
             self._quietly(self._show_values)
 
@@ -161,19 +146,15 @@ class MessageForm:
         self._quietly(lambda: self._text.set_value(text))
 
     def _quietly(self, action: Callable[[], object]) -> None:
-        """Change what is shown, without taking it for a change by the person."""
+        """Change the shown value without reporting it as the user's change."""
         self._own = True
         try:
             action()
         finally:
             self._own = False
 
-    def _say(self, fault: str) -> None:
-        self._fault.set_text(fault)
-        self._fault.set_visibility(bool(fault))
-
 
 def _options(field: FormField, value: Any) -> dict[Any, str]:
     """Return the names of values, with one for a value that has none."""
-    named = {one: f"{name} ({one})" for one, name in field.choices.items()}
+    named = {choice: f"{name} ({choice})" for choice, name in field.choices.items()}
     return named if value in named else {value: str(value), **named}

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import time
-from typing import NamedTuple, get_args
+from collections.abc import Callable
+from typing import NamedTuple
 
 import msgspec
 from nicegui import background_tasks, run, ui
 from nicegui.events import GenericEventArguments
 
 from rosz.diagram import (
+    CONTENTS,
     Content,
     Picture,
     PictureOptions,
@@ -20,17 +22,20 @@ from rosz.diagram import (
     write_svg,
 )
 from rosz.errors import RoszError
-from rosz.introspect.nodes import find_nodes, format_node
-from rosz.introspect.survey import Survey
-from rosz.introspect.topics import format_topic
+from rosz.introspect import Survey, find_nodes, format_node, format_topic
 from rosz.names import short_type
 from rosz.web.model import System, Traffic
-from rosz.web.pages.layout import Frame, address_of, empty_state, query_of, short_rate_text
-
-__all__ = ("show_graph",)
+from rosz.web.pages.layout import (
+    Frame,
+    address_of,
+    empty_state,
+    query_of,
+    short_rate_text,
+    tool_button,
+)
 
 _PERIOD = 0.05
-"""Seconds between two looks; one at what has not changed costs nearly nothing."""
+"""Seconds between two updates; one without a change costs nearly nothing."""
 _RATES_PERIOD = 1.0
 _CONTENTS = {"nodes": "Nodes only", "active": "Nodes and topics", "all": "All topics"}
 _SWITCHES = {
@@ -57,18 +62,16 @@ _RELABEL = """(labels) => {
 }"""
 
 
-def show_graph(
-    system: System,
-    content: str,
-    nodes: str,
-    topics: str,
-    *,
-    group: int,
-    hide: str,
-    labels: str,
-    pick: str,
-) -> None:
-    """Build the page.
+class _DrawnGraph(NamedTuple):
+    """The state of the drawing; the chosen box is emphasised."""
+
+    picture: Picture
+    written: tuple[str, ...]
+    chosen: str
+
+
+class GraphPage:
+    """The picture with its choices.
 
     Args:
         system: The system.
@@ -76,59 +79,39 @@ def show_graph(
         nodes: Patterns of nodes.
         topics: Patterns of topics.
         group: Depth of the namespaces that get a frame.
-        hide: What is left out, such as ``tf,leaves``; the choice of rqt_graph if it is ``usual``.
-        labels: What is written on arrows, of ``rates`` and ``types``.
+        hide: Kinds that are left out, such as ``tf,leaves``; rqt_graph's choice if it is ``usual``.
+        labels: The labels of arrows, of ``rates`` and ``types``.
         pick: What to tell of, such as ``node:/talker``; empty for nothing.
-    """
-    shown: Content = "nodes"
-    for one in get_args(Content):
-        if one == content:
-            shown = one
-    options = PictureOptions(content=shown, nodes=nodes, topics=topics, group=max(0, group))
-    if hide != _USUAL:
-        hidden = set(hide.split(","))
-        switches = {name: name.removeprefix("hide_") in hidden for name in _SWITCHES}
-        options = msgspec.structs.replace(options, **switches)
-    _Graph(system, options, [one for one in _LABELS if one in labels.split(",")], pick)
-
-
-class _Shown(NamedTuple):
-    """The state of the drawing.
-
-    Args:
-        picture: Boxes and arrows.
-        written: Labels of the arrows.
-        chosen: Key of the box that is emphasised.
-    """
-
-    picture: Picture
-    written: tuple[str, ...]
-    chosen: str
-
-
-class _Graph:
-    """The picture with its choices.
-
-    Args:
-        system: The system.
-        options: What is shown at first.
-        labels: What is written on arrows at first.
-        pick: Key of the box that it tells of at first; empty for none.
     """
 
     def __init__(
-        self, system: System, options: PictureOptions, labels: list[str], pick: str
+        self,
+        system: System,
+        content: str = "nodes",
+        nodes: str = "",
+        topics: str = "",
+        *,
+        group: int = 0,
+        hide: str = _USUAL,
+        labels: str = "rates",
+        pick: str = "",
     ) -> None:
+        shown: Content = next((kind for kind in CONTENTS if kind == content), "nodes")
+        options = PictureOptions(content=shown, nodes=nodes, topics=topics, group=max(0, group))
+        if hide != _USUAL:
+            hidden = set(hide.split(","))
+            switches = {name: name.removeprefix("hide_") in hidden for name in _SWITCHES}
+            options = msgspec.structs.replace(options, **switches)
         self._options = options
-        self._written = tuple(labels)
+        self._written = tuple(choice for choice in _LABELS if choice in labels.split(","))
         self._frame = frame = Frame(system, "Graph", "/graph")
         self._system = system
         self._watch = frame.use(system.graph)
         self._traffic: Traffic = frame.use(system.traffic)
         self._wanted: object = None
         self._due = 0.0
-        self._shown: _Shown | None = None
-        self._drawn: _Shown | None = None
+        self._shown: _DrawnGraph | None = None
+        self._drawn: _DrawnGraph | None = None
         self._draws = False
         self._labels: dict[int, str] = {}
         self._picture = Picture()
@@ -178,16 +161,11 @@ class _Graph:
                     ui.button(icon=icon, on_click=lambda step=step: self._scale(step)).props(
                         f'flat dense round aria-label="{label}"'
                     )
-            ui.button(
-                "SVG",
-                icon="download",
-                on_click=lambda: ui.download.content(write_svg(self._picture), "graph.svg"),
-            ).props("flat dense no-caps")
-            ui.button(
-                "DOT",
-                icon="download",
-                on_click=lambda: ui.download.content(write_dot(self._picture), "graph.dot"),
-            ).props("flat dense no-caps")
+            tool_button("SVG", "download", lambda: self._save(write_svg, "graph.svg"))
+            tool_button("DOT", "download", lambda: self._save(write_dot, "graph.dot"))
+
+    def _save(self, write: Callable[[Picture], str], name: str) -> None:
+        ui.download.content(write(self._picture), name)
 
     def _add_options(self) -> None:
         options = self._options
@@ -240,17 +218,16 @@ class _Graph:
 
     def _choose_label(self, name: str, *, shown: bool) -> None:
         self._written = tuple(
-            one for one in _LABELS if (shown if one == name else one in self._written)
+            label for label in _LABELS if (shown if label == name else label in self._written)
         )
-        self._show_address()
-        self._refresh()
+        self._choose()
 
     def _scale(self, step: int) -> None:
         self._zoom = min(300, max(40, self._zoom + step))
         self._drawing.style(f"zoom: {self._zoom / 100}")
 
     def _refresh(self) -> None:
-        """Draw what has changed; the rates on the arrows change once a second."""
+        """Draw the changes; the rates on the arrows change once a second."""
         if self._drawn is not None and not self._frame.connected:
             return  # a browser that went elsewhere, or that comes back
         survey, now = self._watch.survey(), time.monotonic()
@@ -267,22 +244,27 @@ class _Graph:
         self._wanted, self._due = wanted, now + _RATES_PERIOD
         self._empty.set_visibility(not self._picture.boxes and self._watch.complete)
         self._card.set_visibility(bool(self._picture.boxes))
+        self._update_drawing()
+
+    def _update_drawing(self) -> None:
+        """Draw the picture anew if it has changed, and otherwise only the rates that have."""
         flows = self._flows()
-        shown = _Shown(self._picture, self._written if flows else (), self._chosen)
+        shown = _DrawnGraph(self._picture, self._written if flows else (), self._chosen)
         if shown != self._shown:
             self._shown = shown
             if not self._draws:
                 background_tasks.create(self._draw())
-        elif self._drawn is self._shown and (
-            changed := _changes(self._labels, labels_of(self._picture, flows))
-        ):
-            self._labels.update(changed)
-            ui.run_javascript(f"({_RELABEL})({json.dumps(changed)})")
+        elif self._drawn is self._shown:
+            labels = dict(enumerate(labels_of(self._picture, flows)))
+            changed = dict(labels.items() - self._labels.items())
+            if changed:
+                self._labels.update(changed)
+                ui.run_javascript(f"({_RELABEL})({json.dumps(changed)})")
 
     async def _draw(self) -> None:
         """Draw on another thread, as the layout of a large picture takes a while.
 
-        What changes meanwhile is drawn after it, so that a page in a burst of changes shows some.
+        Changes in the meantime are drawn after it, so that a page in a burst of changes shows some.
         """
         self._draws = True
         try:
@@ -299,17 +281,17 @@ class _Graph:
             self._draws = False
 
     def _flows(self) -> dict[str, str]:
-        """Return what is written on arrows, by topic."""
+        """Return the labels of arrows, by topic."""
         topics = {topic for arrow in self._picture.arrows for topic in arrow.topics}
         types = self._watch.survey().view.topics() if "types" in self._written else {}
-        found = {}
+        flows = {}
         for topic in topics:
             flow = self._traffic.flow(topic) if "rates" in self._written else None
             parts = [] if flow is None else [short_rate_text(flow.rate)]
             parts += map(short_type, types.get(topic, ()))
             if parts:
-                found[topic] = " ".join(parts)
-        return found
+                flows[topic] = " ".join(parts)
+        return flows
 
     def _pick(self, event: GenericEventArguments) -> None:
         self._chosen = str(event.args)
@@ -318,7 +300,7 @@ class _Graph:
         self._refresh()
 
     def _describe_chosen(self) -> None:
-        """Tell of what is chosen."""
+        """Describe the chosen box."""
         self._described = True
         kind, _, name = self._chosen.partition(":")
         try:
@@ -333,10 +315,6 @@ class _Graph:
                     ui.link("Open the topic", query_of("/topics", topic=name))
                 ui.button("Close", on_click=dialog.close).props("flat no-caps")
         dialog.on("hide", dialog.delete)
-
-
-def _changes(before: dict[int, str], labels: list[str]) -> dict[int, str]:
-    return {number: text for number, text in enumerate(labels) if before.get(number) != text}
 
 
 def _describe(survey: Survey, kind: str, name: str) -> str:

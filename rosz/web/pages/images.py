@@ -2,37 +2,24 @@
 
 from __future__ import annotations
 
-from urllib.parse import urlencode
-
 from nicegui import ui
 from nicegui.events import MouseEventArguments
 
 from rosz.errors import RoszError
-from rosz.introspect.topics import list_topics
+from rosz.introspect import list_topics
 from rosz.web.model import IMAGE_TYPES, ImageWatch, System
-from rosz.web.pages.layout import Frame, address_of, empty_state, rate_text
-
-__all__ = ("show_images",)
+from rosz.web.pages.layout import Frame, address_of, empty_state, offer_options, query_of, rate_text
 
 _LIST_PERIOD = 1.0
 _PERIOD = 0.05
 
 
-def show_images(system: System, topics: str) -> None:
-    """Build the page.
+class ImagesPage:
+    """The choice of topics, which have commas between in the address, and a card for each."""
 
-    Args:
-        system: The system.
-        topics: Topics that are shown, with commas between.
-    """
-    _Images(system, [one for one in topics.split(",") if one])
-
-
-class _Images:
-    """The choice of topics, and a card for each."""
-
-    def __init__(self, system: System, topics: list[str]) -> None:
+    def __init__(self, system: System, topics: str = "") -> None:
         self._system = system
+        chosen = [topic for topic in topics.split(",") if topic]
         self._frame = frame = Frame(system, "Images", "/images")
         self._graph = frame.use(system.graph)
         self._views: dict[str, _View] = {}
@@ -40,8 +27,8 @@ class _Images:
             with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
                 self._select = (
                     ui.select(
-                        topics,
-                        value=topics,
+                        chosen,
+                        value=chosen,
                         multiple=True,
                         label="Topics of images",
                         on_change=self._choose,
@@ -67,24 +54,23 @@ class _Images:
 
     def _list(self) -> None:
         survey = self._graph.survey()
-        found = {
-            one.name for one in list_topics(survey.view.tokens) if IMAGE_TYPES & set(one.types)
+        names = {
+            entry.name
+            for entry in list_topics(survey.view.tokens)
+            if IMAGE_TYPES & set(entry.types)
         }
         chosen = list(self._select.value or [])
-        options = sorted({*found, *chosen})
-        if self._select.options != options:
-            self._select.set_options(options, value=chosen)
+        options = offer_options(self._select, names)
         self._empty.set_visibility(not options and self._graph.complete)
         for topic in chosen:
-            if topic not in self._views and topic in found:
+            if topic not in self._views and topic in names:
                 self._open(topic)
 
     def _choose(self) -> None:
         chosen = list(self._select.value or [])
-        for topic in [one for one in self._views if one not in chosen]:
+        for topic in [shown for shown in self._views if shown not in chosen]:
             self._views.pop(topic).remove()
-        query = urlencode({"topics": ",".join(chosen)}, safe="/,")
-        address_of(f"/images?{query}" if chosen else "/images")
+        address_of(query_of("/images", topics=",".join(chosen)))
         self._list()
 
     def _open(self, topic: str) -> None:
@@ -132,8 +118,7 @@ class _View:
         self._image.set_source(f"/picture/{self._key}?n={self._shown}")
         flow = watch.flow()
         text = watch.description() + (f" · {rate_text(flow.rate)}" if flow is not None else "")
-        if self._flow.text != text:
-            self._flow.set_text(text)
+        self._flow.set_text(text)
 
     def _point(self, event: MouseEventArguments) -> None:
         try:

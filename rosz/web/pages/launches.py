@@ -1,18 +1,28 @@
-"""Running launches: their nodes with what they use, and the output of one of them."""
+"""Running launches: their nodes with processor time and memory, and the output of a node."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
-from urllib.parse import urlencode
+from typing import Any, Literal, TypeAlias
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from rosz.launch.run import NodeStatus
 from rosz.web.model import Launches, NodeOutput, RunningLaunch, System
-from rosz.web.pages.layout import Frame, column, duration_text, size_text
+from rosz.web.pages.layout import (
+    Frame,
+    add_table,
+    column,
+    duration_text,
+    number_column,
+    query_of,
+    show_rows,
+    show_text,
+    size_text,
+    tool_button,
+)
 
-__all__ = ("LaunchCards", "confirm", "show_output")
+_Action: TypeAlias = Literal["restart", "stop"]
 
 _LINES = 1000
 _PERIOD = 0.4
@@ -36,12 +46,7 @@ _KINDS = {"running": "good", "failed": "bad", "ended": "soft"}
 
 
 class LaunchCards:
-    """A card for each running launch.
-
-    Args:
-        frame: The page.
-        launches: The launches.
-    """
+    """A card for each running launch."""
 
     def __init__(self, frame: Frame, launches: Launches) -> None:
         self._frame = frame
@@ -54,20 +59,17 @@ class LaunchCards:
 
     def update(self) -> None:
         """Show what runs now."""
-        found = {one.key: one for one in self._launches.found or ()}
-        if self._fault.text != self._launches.fault:
-            self._fault.set_text(self._launches.fault)
-        self._fault.set_visibility(bool(self._launches.fault))
-        self._box.set_visibility(bool(found or self._launches.fault))
-        for key in self._cards.keys() - found:
+        launches = {running.key: running for running in self._launches.found or ()}
+        show_text(self._fault, self._launches.fault)
+        self._box.set_visibility(bool(launches or self._launches.fault))
+        for key in self._cards.keys() - launches:
             self._cards.pop(key).delete()
             del self._tables[key]
-        for key, launch in found.items():
+        for key, launch in launches.items():
             if key not in self._cards:
                 self._add(launch)
             rows = [_row(launch, node) for node in launch.status.nodes]
-            if self._tables[key].rows != rows:
-                self._tables[key].rows = rows
+            show_rows(self._tables[key], rows)
 
     def _add(self, launch: RunningLaunch) -> None:
         status = launch.status
@@ -76,27 +78,19 @@ class LaunchCards:
             with ui.row().classes("w-full items-baseline px-4 pt-3 gap-x-3 gap-y-0"):
                 ui.label(files).classes("text-base font-semibold").tooltip(", ".join(status.files))
                 ui.label(f"launch {status.pid} on {status.host}").classes("rosz-soft text-sm")
-            table = (
-                ui.table(
-                    rows=[],
-                    columns=[
-                        column("name", "Node"),
-                        column("state", "State"),
-                        column("buttons", ""),
-                        column("type", "Type", "rosz-wide rosz-soft"),
-                        column("pid", "Process", "rosz-number rosz-wide", align="right"),
-                        column("restarts", "Restarts", "rosz-number rosz-wide", align="right"),
-                        column("cpu", "CPU", "rosz-number", align="right"),
-                        column("memory", "Memory", "rosz-number", align="right"),
-                        column("uptime", "Running for", "rosz-number rosz-wide", align="right"),
-                        column("machine", "Machine", "rosz-wide"),
-                    ],
-                    row_key="name",
-                    pagination=20,
-                )
-                .classes("w-full")
-                .props("flat dense")
-            )
+            columns = [
+                column("name", "Node"),
+                column("state", "State"),
+                column("buttons", ""),
+                column("type", "Type", "rosz-wide rosz-soft"),
+                number_column("pid", "Process", "rosz-wide"),
+                number_column("restarts", "Restarts", "rosz-wide"),
+                number_column("cpu", "CPU"),
+                number_column("memory", "Memory"),
+                number_column("uptime", "Running for", "rosz-wide"),
+                column("machine", "Machine", "rosz-wide"),
+            ]
+            table = add_table(columns, most=20)
         table.add_slot("body-cell-name", _NAME_CELL)
         table.add_slot("body-cell-state", _STATE_CELL)
         table.add_slot("body-cell-buttons", _BUTTONS_CELL)
@@ -104,33 +98,32 @@ class LaunchCards:
         table.on("stop", lambda event: self._request(launch.key, "stop", event))
         self._cards[launch.key], self._tables[launch.key] = card, table
 
-    async def _request(
-        self, key: str, action: Literal["restart", "stop"], event: GenericEventArguments
-    ) -> None:
+    async def _request(self, key: str, action: _Action, event: GenericEventArguments) -> None:
         name = str(event.args)
-        launch = next((one for one in self._launches.found or () if one.key == key), None)
+        launches = self._launches.found or ()
+        launch = next((running for running in launches if running.key == key), None)
         if launch is None:
             ui.notify(f"the launch of '{name}' has ended", type="negative")
             return
-        text = self._launches.describe(launch, name, action)
         with self._box:
-            if text and not await confirm(f"{action.capitalize()} {name}?", text, action):
-                return
-            done = "runs again" if action == "restart" else "is stopped"
-            await self._frame.attempt(
-                lambda: self._launches.act(key, action, name), f"{name} {done}"
-            )
-        self.update()
+            if await _act(self._frame, self._launches, launch, action, name):
+                self.update()
+
+
+async def _act(
+    frame: Frame, launches: Launches, launch: RunningLaunch, action: _Action, name: str
+) -> bool:
+    """Restart or stop a node, unless the user takes it back; return whether to go on."""
+    text = launches.describe(launch, name, action)
+    if text and not await confirm(f"{action.capitalize()} {name}?", text, action):
+        return False
+    done = "runs again" if action == "restart" else "is stopped"
+    await frame.attempt(lambda: launches.act(launch.key, action, name), f"{name} {done}")
+    return True
 
 
 async def confirm(title: str, text: str, button: str) -> bool:
-    """Ask whether something shall be done, and return the answer.
-
-    Args:
-        title: The question.
-        text: What it means.
-        button: Text of the button that does it.
-    """
+    """Ask a question with its meaning, and return whether the button was pressed that does it."""
     with ui.dialog() as dialog, ui.card().classes("rosz-card max-w-lg"):
         ui.label(title).classes("text-base font-semibold")
         ui.label(text)
@@ -149,7 +142,7 @@ def _row(launch: RunningLaunch, node: NodeStatus) -> dict[str, Any]:
     runs = bool(node.pid)
     return {
         "name": node.name,
-        "address": f"/output?{urlencode({'node': node.name}, safe='/')}",
+        "address": query_of("/output", node=node.name),
         "members": ", ".join(node.members),
         "state": node.state,
         "kind": _KINDS.get(node.state, "busy"),
@@ -164,43 +157,32 @@ def _row(launch: RunningLaunch, node: NodeStatus) -> dict[str, Any]:
     }
 
 
-def show_output(system: System, node: str) -> None:
-    """Build the page of the output of a node.
+class OutputPage:
+    """The newest lines of the output of a node, by its full name, and the buttons."""
 
-    Args:
-        system: The system.
-        node: Full name of the node.
-    """
-    frame = Frame(system, "Output", "/")
-    with frame.content:
+    def __init__(self, system: System, node: str = "") -> None:
+        self._frame = frame = Frame(system, "Output", "/")
         if not system.permission.sees_launches:
             frame.show_fault("the rules of this machine do not let this page see launches")
             return
-        _Output(frame, system, node)
-
-
-class _Output:
-    """The newest lines, and the buttons."""
-
-    def __init__(self, frame: Frame, system: System, node: str) -> None:
-        self._frame = frame
         self._name = node
         self._launches = frame.use(system.launches)
         self._output = NodeOutput(system.node, node)
         frame.keep(self._output)
         self._waiting = ""
+        with frame.content:
+            self._add_output(node)
+        frame.every(_PERIOD, self._refresh)
+
+    def _add_output(self, node: str) -> None:
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
             ui.link("Overview", "/")
             ui.label(node).classes("font-semibold")
             self._state = ui.label("").classes("rosz-soft")
             ui.space()
             self._pause = ui.switch("Pause").props("dense")
-            ui.button("Restart", icon="restart_alt", on_click=lambda: self._act("restart")).props(
-                "flat dense no-caps"
-            )
-            ui.button("Stop", icon="stop", on_click=lambda: self._act("stop")).props(
-                "flat dense no-caps"
-            )
+            tool_button("Restart", "restart_alt", lambda: self._act("restart"))
+            tool_button("Stop", "stop", lambda: self._act("stop"))
         self._empty = ui.label("It has written nothing yet.").classes("rosz-soft")
         self._log = (
             ui.log(max_lines=_LINES)
@@ -208,12 +190,10 @@ class _Output:
             .style("height: calc(100vh - 190px)")
         )
         self._log.props('role=log aria-label="Output"')
-        frame.every(_PERIOD, self._refresh)
 
     def _launch(self) -> RunningLaunch | None:
-        return next(
-            (one for one in self._launches.found or () if one.find(self._name) is not None), None
-        )
+        launches = self._launches.found or ()
+        return next((launch for launch in launches if launch.find(self._name) is not None), None)
 
     def _refresh(self) -> None:
         launch = self._launch()
@@ -222,9 +202,7 @@ class _Output:
         parts.append(self._output.state)
         if self._output.skipped:
             parts.append(f"{size_text(self._output.skipped)} left out")
-        text = " · ".join(part for part in parts if part)
-        if self._state.text != text:
-            self._state.set_text(text)
+        self._state.set_text(" · ".join(part for part in parts if part))
         if self._pause.value:
             return
         text = self._output.take()
@@ -236,15 +214,9 @@ class _Output:
             self._empty.set_visibility(False)
             self._log.push("\n".join(lines[-_LINES:]))
 
-    async def _act(self, action: Literal["restart", "stop"]) -> None:
+    async def _act(self, action: _Action) -> None:
         launch = self._launch()
         if launch is None:
             ui.notify(f"no launch runs '{self._name}'", type="negative")
             return
-        text = self._launches.describe(launch, self._name, action)
-        if text and not await confirm(f"{action.capitalize()} {self._name}?", text, action):
-            return
-        await self._frame.attempt(
-            lambda: self._launches.act(launch.key, action, self._name),
-            f"{self._name} {'runs again' if action == 'restart' else 'is stopped'}",
-        )
+        await _act(self._frame, self._launches, launch, action, self._name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, TypeVar
 from urllib.parse import urlencode
 
@@ -12,23 +12,7 @@ from nicegui import run, ui
 
 from rosz.errors import RoszError
 from rosz.lifecycle import Closable
-from rosz.web.model import Shared, System
-
-__all__ = (
-    "ENTRIES",
-    "Entry",
-    "Frame",
-    "address_of",
-    "bandwidth_text",
-    "column",
-    "duration_text",
-    "empty_state",
-    "offer_choice",
-    "query_of",
-    "rate_text",
-    "short_rate_text",
-    "size_text",
-)
+from rosz.web.model import SharedResource, System
 
 T = TypeVar("T", bound=Closable)
 R = TypeVar("R")
@@ -45,14 +29,8 @@ _CHOICE = """(event, row) => {
 }"""
 
 
-class Entry(NamedTuple):
-    """One page in the navigation.
-
-    Args:
-        path: Path of its address.
-        title: Title.
-        icon: Name of its icon.
-    """
+class NavigationEntry(NamedTuple):
+    """One page in the navigation."""
 
     path: str
     title: str
@@ -60,19 +38,19 @@ class Entry(NamedTuple):
 
 
 ENTRIES = (
-    Entry("/", "Overview", "space_dashboard"),
-    Entry("/graph", "Graph", "hub"),
-    Entry("/topics", "Topics", "swap_horiz"),
-    Entry("/plot", "Plot", "show_chart"),
-    Entry("/images", "Images", "photo_camera"),
-    Entry("/3d", "3D", "view_in_ar"),
-    Entry("/console", "Console", "subject"),
-    Entry("/parameters", "Parameters", "tune"),
-    Entry("/reconfigure", "Reconfigure", "settings_input_component"),
-    Entry("/services", "Services", "build"),
-    Entry("/actions", "Actions", "flag"),
-    Entry("/bags", "Bags", "inventory_2"),
-    Entry("/drive", "Drive", "sports_esports"),
+    NavigationEntry("/", "Overview", "space_dashboard"),
+    NavigationEntry("/graph", "Graph", "hub"),
+    NavigationEntry("/topics", "Topics", "swap_horiz"),
+    NavigationEntry("/plot", "Plot", "show_chart"),
+    NavigationEntry("/images", "Images", "photo_camera"),
+    NavigationEntry("/3d", "3D", "view_in_ar"),
+    NavigationEntry("/console", "Console", "subject"),
+    NavigationEntry("/parameters", "Parameters", "tune"),
+    NavigationEntry("/reconfigure", "Reconfigure", "settings_input_component"),
+    NavigationEntry("/services", "Services", "build"),
+    NavigationEntry("/actions", "Actions", "flag"),
+    NavigationEntry("/bags", "Bags", "inventory_2"),
+    NavigationEntry("/drive", "Drive", "sports_esports"),
 )
 """The pages, in the order of the navigation."""
 
@@ -127,7 +105,7 @@ body.body--dark .rosz-label { color: #e6eaf2; }
 
 
 class Frame:
-    """One opened page: its header and navigation, and what it uses until it is closed.
+    """One opened page: its header and navigation, and its resources until it is closed.
 
     Args:
         system: The system that it shows.
@@ -214,9 +192,9 @@ class Frame:
         ) as button:
             tooltip = ui.tooltip(f"Colors: {theme}")
 
-    # What a page uses.
+    # Resources of a page.
 
-    def use(self, shared: Shared[T]) -> T:
+    def use(self, shared: SharedResource[T]) -> T:
         """Open something until the page is closed.
 
         Raises:
@@ -268,9 +246,7 @@ class Frame:
 
     def show_fault(self, text: str) -> None:
         """Show a sentence at the top of the page; hide it if it is empty."""
-        if self._fault.text != text:
-            self._fault.set_text(text)
-        self._fault.set_visibility(bool(text))
+        show_text(self._fault, text)
 
     async def attempt(self, action: Callable[[], R], done: str = "") -> R | None:
         """Run something that may take long, and say how it went.
@@ -280,10 +256,10 @@ class Frame:
             done: What to say if it succeeds.
 
         Returns:
-            What the function returns; None if it raises an error of rosz, which is shown.
+            The result of the function; None if it raises an error of rosz, which is shown.
         """
         try:
-            found = await run.io_bound(action)
+            result = await run.io_bound(action)
         except RoszError as error:
             _log.debug("a page failed to act", exc_info=True)
             ui.notify(
@@ -292,7 +268,7 @@ class Frame:
             return None
         if done:
             ui.notify(done, type="positive")
-        return found
+        return result
 
 
 def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.column:
@@ -306,28 +282,69 @@ def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.colum
     return column
 
 
+def show_text(label: ui.label, text: str) -> None:
+    """Show a text, and hide its label if it is empty."""
+    label.set_text(text)
+    label.set_visibility(bool(text))
+
+
+def card(title: str, classes: str = "p-4 gap-2") -> ui.column:
+    """Add a card with a title, and return it for its contents."""
+    with ui.column().classes(f"rosz-card {classes} min-w-0 w-full") as column:
+        ui.label(title).classes("text-base font-semibold")
+    return column
+
+
+def tool_button(text: str, icon: str, act: Callable[[], Any]) -> ui.button:
+    """Add a flat button, as rows of tools have them."""
+    return ui.button(text, icon=icon, on_click=act).props("flat dense no-caps")
+
+
+def add_table(columns: list[dict[str, Any]], key: str = "name", most: int = 12) -> ui.table:
+    """Add a table without rows, which shows that many at a time; a column tells rows apart."""
+    table = ui.table(rows=[], columns=columns, row_key=key, pagination=most)
+    return table.classes("w-full").props("flat dense")
+
+
+def show_rows(table: ui.table, rows: list[dict[str, Any]]) -> None:
+    """Give a table other rows, unless they are the same."""
+    if table.rows != rows:
+        table.rows = rows
+
+
+def add_select(
+    label: str, chosen: str, on_change: Callable[..., object], **options: Any
+) -> ui.select:
+    """Add a choice of names, which has only the chosen one yet; see `offer_options`."""
+    names = [chosen] if chosen else []
+    select = ui.select(names, value=chosen or None, label=label, on_change=on_change, **options)
+    return select.props("dense options-dense")
+
+
+def offer_options(select: ui.select, names: Iterable[str]) -> list[str]:
+    """Offer names beside those that are chosen, and return all, sorted."""
+    chosen = select.value
+    options = sorted({*names, *(chosen if isinstance(chosen, list) else filter(None, [chosen]))})
+    if select.options != options:
+        select.set_options(options, value=chosen)
+    return options
+
+
 def address_of(path: str) -> None:
     """Show the address that the page has now, so that it can be kept and sent."""
     ui.run_javascript(f"history.replaceState(null, '', {json.dumps(path)})")
 
 
 def query_of(path: str, **given: str) -> str:
-    """Return the address of a page with what it shows; empty values are left out.
-
-    Args:
-        path: Its path.
-        given: The names of the query with their values.
-    """
-    query = urlencode({name: value for name, value in given.items() if value}, safe="/,:*[]")
+    """Return the address of a page with what it shows; empty values are left out."""
+    query = urlencode({name: value for name, value in given.items() if value}, safe="/,:*[]@")
     return f"{path}?{query}" if query else path
 
 
 def offer_choice(table: ui.table, choose: Callable[[str], object]) -> None:
-    """Let a row be chosen by a click, or by its name, which is a link, with the keyboard.
+    """Let a row be chosen by a click, or by its ``name``, which is a link, with the keyboard.
 
-    Args:
-        table: A table whose rows have a ``name``, and an ``address`` that shows it.
-        choose: Function that is called with the name.
+    Rows also have an ``address`` that shows them.
     """
     table.classes("cursor-pointer")
     table.add_slot("body-cell-name", _CHOICE_CELL)
@@ -337,15 +354,7 @@ def offer_choice(table: ui.table, choose: Callable[[str], object]) -> None:
 def column(
     name: str, label: str, classes: str = "", *, align: str = "left", sort: str = ""
 ) -> dict[str, Any]:
-    """Return a column of a table.
-
-    Args:
-        name: Name of its field in the rows.
-        label: Title.
-        classes: Classes of its cells.
-        align: Alignment.
-        sort: Field with the numbers to sort by; the shown texts if empty.
-    """
+    """Return a column of a table, sorted by the numbers in a field, or by the shown texts."""
     column: dict[str, Any] = {
         "name": name,
         "label": label,
@@ -358,6 +367,11 @@ def column(
     if sort:
         column[":sort"] = f"(a, b, one, other) => one.{sort} - other.{sort}"
     return column
+
+
+def number_column(name: str, label: str, classes: str = "", sort: str = "") -> dict[str, Any]:
+    """Return a column of numbers; the arguments are those of `column`."""
+    return column(name, label, f"rosz-number {classes}".strip(), align="right", sort=sort)
 
 
 def duration_text(seconds: float) -> str:

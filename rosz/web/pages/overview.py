@@ -1,4 +1,4 @@
-"""The first page: nodes, topics with what flows on them, and what the doctor found."""
+"""The first page: nodes, topics with their traffic, and the doctor's findings."""
 
 from __future__ import annotations
 
@@ -9,23 +9,31 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from rosz.errors import NotFoundError
-from rosz.introspect.nodes import NodeEntry, find_nodes, kill, list_nodes, machines
-from rosz.introspect.survey import Survey
-from rosz.introspect.topics import list_topics
+from rosz.introspect import (
+    NodeEntry,
+    Survey,
+    Topic,
+    find_nodes,
+    kill,
+    list_nodes,
+    list_topics,
+    machines,
+)
 from rosz.web.model import Findings, System, Traffic
 from rosz.web.pages.launches import LaunchCards, confirm
 from rosz.web.pages.layout import (
     Frame,
+    add_table,
     bandwidth_text,
     column,
     duration_text,
     empty_state,
+    number_column,
     query_of,
     rate_text,
+    show_rows,
 )
 from rosz.wire import Kind
-
-__all__ = ("show_overview",)
 
 _PERIOD = 1.0
 _ROWS = 15
@@ -49,11 +57,8 @@ def show_overview(system: System) -> None:
             "Start a launch file, a node or an example; it appears here at once:",
             "rosz run turtlesim turtlesim_node",
         )
-        launches = (
-            LaunchCards(frame, frame.use(system.launches))
-            if system.permission.sees_launches
-            else None
-        )
+        seen = system.permission.sees_launches
+        launches = LaunchCards(frame, frame.use(system.launches)) if seen else None
         tables = _Tables(frame, traffic)
 
     def refresh() -> None:
@@ -91,17 +96,16 @@ class _Tiles:
                         ui.label(name).classes("rosz-soft text-sm")
 
     def update(self, survey: Survey, own: str, findings: Findings) -> None:
-        nodes = [one for one in list_nodes(survey) if one.name != own]
+        nodes = [node for node in list_nodes(survey) if node.name != own]
         topics = list_topics(token for token in survey.view.tokens if token.node_name != own)
-        found = findings.found
+        shown = findings.found
         for name, value in (
             ("Nodes", str(len(nodes))),
             ("Topics", str(len(topics))),
             ("Machines", str(len(machines(nodes)))),
-            ("Findings", "…" if found is None else str(len(found))),
+            ("Findings", "…" if shown is None else str(len(shown))),
         ):
-            if self._labels[name].text != value:
-                self._labels[name].set_text(value)
+            self._labels[name].set_text(value)
 
 
 class _Doctor:
@@ -118,11 +122,11 @@ class _Doctor:
             return
         self._shown = shown
         self._box.clear()
-        found, fault = shown
+        shown_findings, fault = shown
         with self._box:
             if fault:
                 ui.label(fault).classes("rosz-card w-full p-3 text-negative")
-            for finding in found or ():
+            for finding in shown_findings or ():
                 color = "negative" if finding.level == "error" else "warning"
                 icon = "error" if finding.level == "error" else "warning"
                 with (
@@ -163,36 +167,16 @@ class _Tables:
                     )
                 ui.label("measure all").classes("rosz-soft text-sm -ml-2")
                 search = ui.input(placeholder="Filter").props("dense clearable").classes("w-40")
-            self.topics = (
-                ui.table(
-                    rows=[],
-                    columns=[
-                        column("name", "Topic"),
-                        column("type", "Type", "rosz-wide rosz-soft"),
-                        column("rate", "Rate", "rosz-number", align="right", sort="rate_value"),
-                        column(
-                            "bandwidth",
-                            "Bandwidth",
-                            "rosz-number",
-                            align="right",
-                            sort="bandwidth_value",
-                        ),
-                        column(
-                            "latency",
-                            "Latency",
-                            "rosz-number rosz-wide",
-                            align="right",
-                            sort="latency_value",
-                        ),
-                        column("publishers", "Pub", "rosz-number rosz-wide", align="right"),
-                        column("subscribers", "Sub", "rosz-number rosz-wide", align="right"),
-                    ],
-                    row_key="name",
-                    pagination=_ROWS,
-                )
-                .classes("w-full")
-                .props("flat dense")
-            )
+            columns = [
+                column("name", "Topic"),
+                column("type", "Type", "rosz-wide rosz-soft"),
+                number_column("rate", "Rate", sort="rate_value"),
+                number_column("bandwidth", "Bandwidth", sort="bandwidth_value"),
+                number_column("latency", "Latency", "rosz-wide", sort="latency_value"),
+                number_column("publishers", "Pub", "rosz-wide"),
+                number_column("subscribers", "Sub", "rosz-wide"),
+            ]
+            self.topics = add_table(columns, most=_ROWS)
             self.topics.add_slot("body-cell-name", _LINK_CELL)
             search.on_value_change(
                 lambda change: setattr(self.topics, "filter", change.value or "")
@@ -201,23 +185,14 @@ class _Tables:
     def _add_nodes(self) -> None:
         with ui.column().classes("rosz-card w-full p-0 gap-0"):
             ui.label("Nodes").classes("text-base font-semibold px-4 pt-3")
-            self.nodes = (
-                ui.table(
-                    rows=[],
-                    columns=[
-                        column("name", "Node"),
-                        column("buttons", ""),
-                        column("host", "Machine"),
-                        column("pid", "Process", "rosz-number", align="right"),
-                        column("since", "Running for", "rosz-number rosz-wide", align="right"),
-                    ],
-                    row_key="key",
-                    pagination=_ROWS,
-                )
-                .classes("w-full")
-                .props("flat dense")
-            )
-
+            columns = [
+                column("name", "Node"),
+                column("buttons", ""),
+                column("host", "Machine"),
+                number_column("pid", "Process"),
+                number_column("since", "Running for", "rosz-wide"),
+            ]
+            self.nodes = add_table(columns, "key", _ROWS)
         self.nodes.add_slot("body-cell-name", _LINK_CELL)
         self.nodes.add_slot("body-cell-buttons", _KILL_CELL)
         self.nodes.on("kill", self._kill)
@@ -225,21 +200,13 @@ class _Tables:
     def _add_machines(self) -> None:
         with ui.column().classes("rosz-card w-full p-0 gap-0"):
             ui.label("Machines").classes("text-base font-semibold px-4 pt-3")
-            self.machines = (
-                ui.table(
-                    rows=[],
-                    columns=[
-                        column("name", "Machine"),
-                        column("nodes", "Nodes", "rosz-number", align="right"),
-                        column("processes", "Processes", "rosz-number", align="right"),
-                        column("topics", "Topics published", "rosz-number", align="right"),
-                    ],
-                    row_key="name",
-                    pagination=_ROWS,
-                )
-                .classes("w-full")
-                .props("flat dense")
-            )
+            columns = [
+                column("name", "Machine"),
+                number_column("nodes", "Nodes"),
+                number_column("processes", "Processes"),
+                number_column("topics", "Topics published"),
+            ]
+            self.machines = add_table(columns, most=_ROWS)
 
     async def _kill(self, event: GenericEventArguments) -> None:
         name, key = event.args["name"], event.args["key"]
@@ -247,9 +214,9 @@ class _Tables:
         session = system.node.context.session
 
         def act() -> None:
-            system.permission.check_control(name)
+            system.permission.check_control(f"control '{name}'")
             tokens = find_nodes(self._survey, name)
-            running = [one for one in tokens if key.startswith(f"{name} {one.zid} ")]
+            running = [token for token in tokens if key.startswith(f"{name} {token.zid} ")]
             if not running:
                 raise NotFoundError(f"this process of node '{name}' has ended already")
             for token in running:
@@ -264,51 +231,45 @@ class _Tables:
         """Show what there is, and return the number of nodes."""
         self._survey = survey
         topics = [
-            self._topic_row(topic.name, topic.type_text, topic.publishers, topic.subscribers)
+            self._topic_row(topic)
             for topic in list_topics(t for t in survey.view.tokens if t.node_name != own)
         ]
-        entries = [one for one in list_nodes(survey) if one.name != own]
+        entries = [entry for entry in list_nodes(survey) if entry.name != own]
+        now = time.time()
         nodes = [
             {
-                "key": f"{one.name} {one.session} {one.pid}",
-                "name": one.name,
+                "key": f"{entry.name} {entry.session} {entry.pid}",
+                "name": entry.name,
                 "address": query_of(
-                    "/graph", content="all", nodes=one.name, pick=f"node:{one.name}"
+                    "/graph", content="all", nodes=entry.name, pick=f"node:{entry.name}"
                 ),
-                "host": one.host or "—",
-                "pid": one.pid or "—",
-                "since": _since(one.started),
+                "host": entry.host or "—",
+                "pid": entry.pid or "—",
+                "since": duration_text(now - entry.started / 1e9) if entry.started else "—",
             }
-            for one in entries
+            for entry in entries
         ]
-        hosts = _machine_rows(survey, entries)
-        for table, rows in (
-            (self.topics, topics),
-            (self.nodes, nodes),
-            (self.machines, hosts),
-        ):
-            if table.rows != rows:
-                table.rows = rows
+        show_rows(self.topics, topics)
+        show_rows(self.nodes, nodes)
+        show_rows(self.machines, _machine_rows(survey, entries))
         self._box.set_visibility(bool(nodes))
         return len(nodes)
 
-    def _topic_row(
-        self, name: str, type_text: str, publishers: tuple[str, ...], subscribers: tuple[str, ...]
-    ) -> dict[str, Any]:
-        flow = self._traffic.flow(name)
+    def _topic_row(self, topic: Topic) -> dict[str, Any]:
+        flow = self._traffic.flow(topic.name)
         latency = None if flow is None else flow.latency
         return {
-            "name": name,
-            "address": query_of("/topics", topic=name),
-            "type": type_text,
+            "name": topic.name,
+            "address": query_of("/topics", topic=topic.name),
+            "type": topic.type_text,
             "rate": "—" if flow is None else rate_text(flow.rate),
             "rate_value": -1.0 if flow is None else round(flow.rate, 1),
             "bandwidth": "—" if flow is None else bandwidth_text(flow.bandwidth),
             "bandwidth_value": -1.0 if flow is None else round(flow.bandwidth),
             "latency": "—" if latency is None else f"{latency * 1e3:.1f} ms",
             "latency_value": -1.0 if latency is None else round(latency, 4),
-            "publishers": len(publishers),
-            "subscribers": len(subscribers),
+            "publishers": len(topic.publishers),
+            "subscribers": len(topic.subscribers),
         }
 
 
@@ -319,14 +280,9 @@ def _machine_rows(survey: Survey, nodes: list[NodeEntry]) -> list[dict[str, Any]
     return [
         {
             "name": host,
-            "nodes": sum(one.host == host for one in nodes),
-            "processes": len({one.pid for one in nodes if one.host == host}),
+            "nodes": sum(node.host == host for node in nodes),
+            "processes": len({node.pid for node in nodes if node.host == host}),
             "topics": len(published.get(host, ())),
         }
         for host in machines(nodes)
     ]
-
-
-def _since(started: int) -> str:
-    """Return how long ago a time in nanoseconds since the Unix epoch was."""
-    return duration_text(time.time() - started / 1e9) if started else "—"

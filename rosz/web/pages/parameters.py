@@ -12,9 +12,7 @@ from rosz.errors import YamlError
 from rosz.params import Value, type_name
 from rosz.params.yaml import inline
 from rosz.web.model import System
-from rosz.web.pages.layout import Frame, address_of, empty_state, query_of
-
-__all__ = ("show_parameters",)
+from rosz.web.pages.layout import Frame, address_of, card, empty_state, query_of, tool_button
 
 _PERIOD = 0.5
 _LONGEST = 120
@@ -25,22 +23,16 @@ _HEADER = """<div class="row items-center no-wrap full-width" style="gap: .5rem"
 </div>"""
 
 
-def show_parameters(system: System, prefix: str, name: str) -> None:
-    """Build the page.
+class ParametersPage:
+    """The tree, its filter, and the changes.
 
     Args:
         system: The system.
         prefix: Text that the shown names contain.
         name: Parameter to edit; empty for none.
     """
-    _Parameters(system, prefix, name)
 
-
-class _Parameters:
-    """The tree, its filter, and the changes."""
-
-    def __init__(self, system: System, prefix: str, name: str) -> None:
-        self._system = system
+    def __init__(self, system: System, prefix: str = "", name: str = "") -> None:
         self._frame = frame = Frame(system, "Parameters", "/parameters")
         self._parameters = frame.use(system.parameters)
         self._values: dict[str, Value] = {}
@@ -69,8 +61,7 @@ class _Parameters:
                         .classes("w-full")
                     )
                     self._tree.add_slot("default-header", _HEADER)
-                with ui.column().classes("rosz-card p-4 gap-2 min-w-0"):
-                    ui.label("Changes since this page looked").classes("text-base font-semibold")
+                with card("Changes since this page looked"):
                     self._changes = ui.column().classes("w-full gap-2")
         frame.every(_PERIOD, self._refresh)
 
@@ -81,15 +72,11 @@ class _Parameters:
                 .props("dense clearable debounce=300")
                 .classes("grow min-w-40")
             )
-            ui.button("New", icon="add", on_click=lambda: self._edit("")).props(
-                "flat dense no-caps"
-            )
-            ui.button("Save", icon="download", on_click=self._save).props("flat dense no-caps")
+            tool_button("New", "add", lambda: self._edit(""))
+            tool_button("Save", "download", self._save)
             upload = ui.upload(on_upload=self._load, auto_upload=True).classes("hidden")
             upload.props('accept=".yaml,.yml"')
-            ui.button("Load", icon="upload", on_click=lambda: upload.run_method("pickFiles")).props(
-                "flat dense no-caps"
-            )
+            tool_button("Load", "upload", lambda: upload.run_method("pickFiles"))
 
     def _filter(self) -> None:
         self._show_address()
@@ -108,10 +95,9 @@ class _Parameters:
         self._values = {
             name: value for name, value in self._parameters.values().items() if wanted in name
         }
-        nodes = _nodes(self._values)
+        nodes, namespaces = _nodes(self._values)
         self._tree.props["nodes"] = nodes
         self._tree.update()
-        namespaces = {one for node in nodes for one in _namespaces(node)}
         if new := namespaces - self._opened:
             self._opened |= new
             self._tree.expand(list(new))
@@ -224,43 +210,22 @@ class _Parameters:
             ui.notify(f"{count} parameters of {event.file.name} are set", type="positive")
 
 
-def _nodes(values: dict[str, Value]) -> list[dict[str, Any]]:
-    """Return parameters as a tree of namespaces."""
-    root: dict[str, Any] = {"children": [], "inner": {}}
+def _nodes(values: dict[str, Value]) -> tuple[list[dict[str, Any]], set[str]]:
+    """Return parameters as a tree of namespaces, and the namespaces."""
+    children: dict[str, list[dict[str, Any]]] = {"/": []}
     for name, value in sorted(values.items()):
-        here, path = root, ""
+        path = "/"
         *spaces, leaf = name.strip("/").split("/")
         for space in spaces:
-            path += f"/{space}"
-            if space not in here["inner"]:
-                node = {
-                    "id": f"{path}/",
-                    "label": space,
-                    "selectable": False,
-                    "children": [],
-                    "inner": {},
-                }
-                here["inner"][space] = node
-                here["children"].append(node)
-            here = here["inner"][space]
-        here["children"].append(
+            above, path = path, f"{path}{space}/"
+            if path not in children:
+                children[path] = []
+                node = {"id": path, "label": space, "selectable": False}
+                children[above].append({**node, "children": children[path]})
+        children[path].append(
             {"id": name, "label": leaf, "value": _short(value), "type": type_name(value)}
         )
-    return [_without_index(node) for node in root["children"]]
-
-
-def _without_index(node: dict[str, Any]) -> dict[str, Any]:
-    children = node.get("children")
-    found = {name: value for name, value in node.items() if name not in {"inner", "children"}}
-    if children:
-        found["children"] = [_without_index(child) for child in children]
-    return found
-
-
-def _namespaces(node: dict[str, Any]) -> list[str]:
-    if "children" not in node:
-        return []
-    return [node["id"], *(one for child in node["children"] for one in _namespaces(child))]
+    return children["/"], children.keys() - {"/"}
 
 
 def _short(value: Value) -> str:

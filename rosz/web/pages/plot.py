@@ -5,16 +5,12 @@ from __future__ import annotations
 import base64
 import time
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
-from nicegui.events import GenericEventArguments
 
 from rosz.errors import RoszError
 from rosz.web.model import Plot, System, split_fields
-from rosz.web.pages.layout import Frame, address_of, empty_state
-
-__all__ = ("show_plot",)
+from rosz.web.pages.layout import Frame, address_of, empty_state, query_of, tool_button
 
 _PERIOD = 0.2
 _LIST_PERIOD = 2.0
@@ -45,8 +41,8 @@ _LEAF = """<span v-if="props.node.field" draggable="true" class="cursor-grab"
 _DROP = "(event) => { event.preventDefault(); emit(event.dataTransfer.getData('text/plain')); }"
 
 
-def show_plot(system: System, fields: str, window: int, times: str) -> None:
-    """Build the page.
+class PlotPage:
+    """The chart and the fields in it.
 
     Args:
         system: The system.
@@ -54,28 +50,19 @@ def show_plot(system: System, fields: str, window: int, times: str) -> None:
         window: Seconds that are shown.
         times: ``arrival``, or ``stamp`` for the time in headers.
     """
-    axes: dict[str, int] = {}
-    for word in fields.replace(",", " ").split():
-        text, _, axis = word.partition("@")
-        number = int(axis) if axis.isdecimal() else 1
-        axes |= dict.fromkeys(split_fields(text), min(_AXES, max(1, number)))
-    chosen = window if window in _WINDOWS else 10
-    _PlotPage(system, axes, chosen, times if times in _TIMES else "arrival")
 
-
-class _PlotPage:
-    """The chart and the fields in it."""
-
-    def __init__(self, system: System, axes: dict[str, int], window: int, times: str) -> None:
+    def __init__(
+        self, system: System, fields: str = "", window: int = 10, times: str = "arrival"
+    ) -> None:
         self._frame = frame = Frame(system, "Plot", "/plot")
         self._graph = frame.use(system.graph)
         self._system = system
-        self._times = times
+        self._times = times if times in _TIMES else "arrival"
         self._plot = Plot(system.node, stamped=times == "stamp")
         frame.keep(self)
-        self._axes = axes
-        self._wanted = list(axes)
-        self._window = window
+        self._axes = _axes_of(fields)
+        self._wanted = list(self._axes)
+        self._window = window if window in _WINDOWS else 10
         self._paused = False
         self._end = time.time()
         self._is_drawn = True
@@ -91,7 +78,7 @@ class _PlotPage:
                     .classes("grow min-w-0 gap-4")
                     .style("flex-basis: 20rem")
                     .on("dragover", js_handler="(event) => event.preventDefault()")
-                    .on("drop", self._drop, js_handler=_DROP)
+                    .on("drop", lambda event: self._want(str(event.args or "")), js_handler=_DROP)
                 ):
                     self._empty = empty_state(
                         "show_chart",
@@ -117,7 +104,7 @@ class _PlotPage:
                 .classes("grow min-w-52")
                 .on("keydown.enter", self._add)
             )
-            ui.button("Add", icon="add", on_click=self._add).props("flat dense no-caps")
+            tool_button("Add", "add", self._add)
             ui.select(
                 _WINDOWS,
                 value=self._window,
@@ -130,17 +117,13 @@ class _PlotPage:
                 label="Time",
                 on_change=lambda change: self._choose_times(change.value),
             ).props("dense options-dense").classes("w-32")
-            self._pause = ui.button(
-                "Pause", icon="pause", on_click=lambda: self._set_paused(paused=not self._paused)
-            ).props("flat dense no-caps")
-            ui.button(
-                "CSV",
-                icon="download",
-                on_click=lambda: ui.download.content(self._plot.table(), "plot.csv"),
-            ).props("flat dense no-caps")
-            ui.button("PNG", icon="download", on_click=self._save_picture).props(
-                "flat dense no-caps"
+            self._pause = tool_button(
+                "Pause", "pause", lambda: self._set_paused(paused=not self._paused)
             )
+            tool_button(
+                "CSV", "download", lambda: ui.download.content(self._plot.table(), "plot.csv")
+            )
+            tool_button("PNG", "download", self._save_picture)
 
     def _add_tree(self) -> None:
         with ui.expansion("Fields", icon="account_tree", value=not self._axes).classes(
@@ -177,12 +160,10 @@ class _PlotPage:
         ]
         self._tree.update()
 
-    def _drop(self, event: GenericEventArguments) -> None:
-        self._want(str(event.args or ""))
-
     def _select(self, event: Any) -> None:
         name = str(event.value or "")
-        if any(name == f"{topic}/{one}" for topic, ones in self._offered.items() for one in ones):
+        topics = self._offered.items()
+        if any(name == f"{topic}/{field}" for topic, fields in topics for field in fields):
             self._want(name)
         elif name:
             self._tree.expand([name])
@@ -239,13 +220,14 @@ class _PlotPage:
 
     def _change_axis(self, name: str) -> None:
         self._axes[name] = self._axes[name] % _AXES + 1
-        self._show_fields()
-        self._show_address()
-        self._draw()
+        self._show_changes()
 
     def _remove(self, name: str) -> None:
         self._plot.remove(name)
         self._axes.pop(name, None)
+        self._show_changes()
+
+    def _show_changes(self) -> None:
         self._show_fields()
         self._show_address()
         self._draw()
@@ -255,10 +237,9 @@ class _PlotPage:
             f"{name}@{axis}" if (axis := self._axes.get(name, 1)) > 1 else name
             for name in (*self._plot.fields, *self._wanted)
         ]
-        query: dict[str, Any] = {"fields": ",".join(fields), "window": self._window}
-        if self._times != "arrival":
-            query["times"] = self._times
-        address_of(f"/plot?{urlencode(query, safe='/,[]@:')}")
+        times = self._times if self._times != "arrival" else ""
+        window = str(self._window)
+        address_of(query_of("/plot", fields=",".join(fields), window=window, times=times))
 
     def _choose_window(self, window: int) -> None:
         self._window = window
@@ -287,7 +268,9 @@ class _PlotPage:
             )
 
     async def _save_picture(self) -> None:
-        back = "#1a1f29" if await self._is_dark() else "#ffffff"
+        script = "return document.body.classList.contains('body--dark')"
+        is_dark = await ui.run_javascript(script, timeout=_PICTURE_SECONDS)
+        back = "#1a1f29" if is_dark else "#ffffff"
         wanted = {"type": "png", "pixelRatio": 2, "backgroundColor": back}
         try:
             address = await self._chart.run_chart_method(
@@ -297,10 +280,6 @@ class _PlotPage:
             ui.notify("the browser did not give the picture", type="negative")
             return
         ui.download.content(base64.b64decode(str(address).partition(",")[2]), "plot.png")
-
-    async def _is_dark(self) -> bool:
-        script = "return document.body.classList.contains('body--dark')"
-        return bool(await ui.run_javascript(script, timeout=_PICTURE_SECONDS))
 
     def _refresh(self) -> None:
         if self._wanted:
@@ -315,29 +294,29 @@ class _PlotPage:
         self._is_drawn = True
 
     def _draw(self) -> None:
-        found = self._plot.series()
+        lines = self._plot.series()
         if not self._paused:
-            newest = max((one.newest for one in found), default=0.0)
+            newest = max((line.newest for line in lines), default=0.0)
             self._end = newest if self._times == "stamp" and newest else time.time()
         begin = self._end - self._window
-        most = min(_MOST, max(_FEWEST, _TOGETHER // max(1, len(found))))
+        most = min(_MOST, max(_FEWEST, _TOGETHER // max(1, len(lines))))
         series = [
             {
-                "name": one.name,
+                "name": line.name,
                 "type": "line",
                 "showSymbol": False,
                 "animation": False,
                 "color": _COLORS[number % len(_COLORS)],
-                "yAxisIndex": self._axis(one.name) - 1,
-                "data": [[round(t * 1000), v] for t, v in one.within(begin, self._end, most)],
+                "yAxisIndex": self._axis(line.name) - 1,
+                "data": [[round(t * 1000), v] for t, v in line.within(begin, self._end, most)],
             }
-            for number, one in enumerate(found)
+            for number, line in enumerate(lines)
         ]
         options = self._chart.options
         options["series"] = series
         options["xAxis"]["min"] = round(begin * 1000)
         options["xAxis"]["max"] = round(self._end * 1000)
-        used = {one["yAxisIndex"] for one in series}
+        used = {line["yAxisIndex"] for line in series}
         for index, axis in enumerate(options["yAxis"]):
             axis["show"] = index in used or not (used or index)
         self._is_drawn = False
@@ -346,14 +325,24 @@ class _PlotPage:
 
     def _axis(self, name: str) -> int:
         """Return the axis of a series, which may be of an element of a field."""
-        field = next(
-            (one for one in self._plot.fields if name == one or name.startswith(f"{one}[")), name
-        )
-        return self._axes.get(field, 1)
+        for field in self._plot.fields:
+            if name == field or name.startswith(f"{field}["):
+                return self._axes.get(field, 1)
+        return self._axes.get(name, 1)
 
     def close(self) -> None:
         """Plot nothing any more."""
         self._plot.close()
+
+
+def _axes_of(text: str) -> dict[str, int]:
+    """Return the axis of each field that an address names."""
+    axes: dict[str, int] = {}
+    for word in text.replace(",", " ").split():
+        fields, _, axis = word.partition("@")
+        number = int(axis) if axis.isdecimal() else 1
+        axes |= dict.fromkeys(split_fields(fields), min(_AXES, max(1, number)))
+    return axes
 
 
 def _options() -> dict[str, Any]:

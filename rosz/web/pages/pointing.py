@@ -14,16 +14,11 @@ from rosz.errors import RoszError
 from rosz.web.model import System
 from rosz.web.scene import TOOLS, Tools
 
-__all__ = ("Pointing",)
-
 _MOVE = "move"
 
 
 class _Pointer(Object3D, component=Path(__file__).with_name("pointer.js")):
     """Handles the pointer in the browser while a tool is selected."""
-
-    def __init__(self) -> None:
-        super().__init__("")
 
     def take(self, tool: str) -> None:
         """Let the pointer be a tool; empty for moving the view."""
@@ -32,12 +27,7 @@ class _Pointer(Object3D, component=Path(__file__).with_name("pointer.js")):
 
 
 class Pointing:
-    """The choice of a tool, and what it publishes.
-
-    Args:
-        system: The system.
-        fixed: Function that returns the fixed frame.
-    """
+    """The choice of a tool, and its publisher, which needs the fixed frame."""
 
     def __init__(self, system: System, fixed: Callable[[], str]) -> None:
         self._tools = Tools(system.node, system.permission)
@@ -69,7 +59,7 @@ class Pointing:
     def add_pointer(self, scene: ui.scene) -> None:
         """Add what follows the pointer in a view."""
         with scene:
-            self._pointer = _Pointer()
+            self._pointer = _Pointer("")
 
     def _take(self) -> None:
         name = str(self._choice.value)
@@ -97,7 +87,7 @@ class Pointing:
             self._send(name, (x, y, z), yaw)
 
     def _send_numbers(self) -> None:
-        x, y, degrees = (float(one.value or 0) for one in self._numbers)
+        x, y, degrees = (float(number.value or 0) for number in self._numbers)
         self._send(str(self._choice.value), (x, y, 0.0), math.radians(degrees))
 
     def _send(self, name: str, point: tuple[float, float, float], yaw: float) -> None:
@@ -117,5 +107,5 @@ class Pointing:
         self._choice.set_value(_MOVE)
 
     def close(self) -> None:
-        """Withdraw what was published."""
+        """Withdraw the published message."""
         self._tools.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 from nicegui.elements.mixins.value_element import ValueElement
@@ -12,9 +11,14 @@ from nicegui.elements.mixins.value_element import ValueElement
 from rosz.errors import RoszError
 from rosz.reconfigure import Config, Description, Group, Setting, find_servers
 from rosz.web.model import Reconfiguration, System
-from rosz.web.pages.layout import Frame, address_of, empty_state
-
-__all__ = ("show_reconfigure",)
+from rosz.web.pages.layout import (
+    Frame,
+    add_select,
+    address_of,
+    empty_state,
+    offer_options,
+    query_of,
+)
 
 _LIST_PERIOD = 1.0
 _PERIOD = 0.1
@@ -22,20 +26,10 @@ _STEPS = 200
 _WIDEST = 1e9
 
 
-def show_reconfigure(system: System, server: str) -> None:
-    """Build the page.
+class ReconfigurePage:
+    """The choice of a server, the first one if it is empty, and its settings."""
 
-    Args:
-        system: The system.
-        server: Server whose settings are shown; empty for the first one.
-    """
-    _Reconfigure(system, server)
-
-
-class _Reconfigure:
-    """The choice of a server, and its settings."""
-
-    def __init__(self, system: System, server: str) -> None:
+    def __init__(self, system: System, server: str = "") -> None:
         self._system = system
         self._frame = frame = Frame(system, "Reconfigure", "/reconfigure")
         self._graph = frame.use(system.graph)
@@ -48,12 +42,7 @@ class _Reconfigure:
         self._busy = False
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-                self._select = ui.select(
-                    [server] if server else [],
-                    value=server or None,
-                    label="Node",
-                    on_change=lambda change: self._choose(change.value),
-                ).props("dense options-dense")
+                self._select = add_select("Node", server, lambda change: self._choose(change.value))
                 self._select.classes("grow")
             self._empty = empty_state(
                 "tune",
@@ -75,12 +64,9 @@ class _Reconfigure:
             opened.close()
 
     def _list(self) -> None:
-        found = find_servers(self._graph.survey().view)
-        chosen = self._select.value
-        options = sorted({*found, *((chosen,) if chosen else ())})
-        if self._select.options != options:
-            self._select.set_options(options, value=chosen)
-        if not chosen and options:
+        servers = find_servers(self._graph.survey().view)
+        options = offer_options(self._select, servers)
+        if not self._select.value and options:
             self._select.set_value(options[0])
         self._empty.set_visibility(not options and self._graph.complete)
 
@@ -92,7 +78,7 @@ class _Reconfigure:
         self._shown, self._seen = None, 0
         self._pending.clear()
         if name:
-            address_of(f"/reconfigure?{urlencode({'server': name}, safe='/')}")
+            address_of(query_of("/reconfigure", server=name))
             try:
                 self._open = Reconfiguration(self._system.node, self._system.permission, name)
             except RoszError as error:
@@ -152,41 +138,35 @@ class _Reconfigure:
             self._change(setting, event.value)
 
         if setting.choices:
-            options = {one.value: one.name for one in setting.choices}
+            options = {choice.value: choice.name for choice in setting.choices}
             options.setdefault(value, str(value))
-            return [
-                ui.select(options, value=value, on_change=change)
-                .props(f"dense options-dense {label}")
-                .classes("grow min-w-40")
-            ]
+            select = ui.select(options, value=value, on_change=change).classes("grow min-w-40")
+            return [select.props(f"dense options-dense {label}")]
         if setting.kind == "bool":
             return [ui.switch(value=bool(value), on_change=change).props(label)]
         if setting.kind == "str":
-            return [
-                ui.input(value=str(value), on_change=change)
-                .props(f"dense debounce=400 {label}")
-                .classes("grow min-w-40")
-            ]
+            text = ui.input(value=str(value), on_change=change).classes("grow min-w-40")
+            return [text.props(f"dense debounce=400 {label}")]
         whole = setting.kind == "int"
-        found: list[ValueElement[Any]] = []
+        editors: list[ValueElement[Any]] = []
         low, high = float(setting.min or 0), float(setting.max or 0)
         if math.isfinite(low) and math.isfinite(high) and 0 < high - low < _WIDEST:
             step = 1 if whole else (high - low) / _STEPS
-            found.append(
+            editors.append(
                 ui.slider(min=low, max=high, step=step, value=value, on_change=change)
                 .props(label)
                 .classes("px-2")
                 .style("width: auto; flex: 1 1 8rem")
             )
-        bounded = bool(found)
+        bounded = bool(editors)
         number = ui.number(
             value=value,
             min=low if bounded else None,
             max=high if bounded else None,
             on_change=change,
         )
-        found.append(number.props(f"dense debounce=400 {label}").classes("w-28"))
-        return found
+        editors.append(number.props(f"dense debounce=400 {label}").classes("w-28"))
+        return editors
 
     def _change(self, setting: Setting, value: Any) -> None:
         if value is None:

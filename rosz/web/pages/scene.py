@@ -13,24 +13,23 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from rosz.errors import RoszError
 from rosz.web.model import IMAGE_TYPES, Frames, System
 from rosz.web.pages.handling import Handling
-from rosz.web.pages.layout import Frame, address_of
+from rosz.web.pages.layout import Frame, add_select, address_of, offer_options, show_text
 from rosz.web.pages.pointing import Pointing
 from rosz.web.scene import (
     AXES,
     GRID,
     HANDLE_TYPE,
+    MOST_DISPLAYS,
     Display,
     HandleDisplay,
     Look,
     Meshes,
-    Setup,
+    SceneSetup,
     format_setup,
     list_displays,
     open_display,
     read_setup,
 )
-
-__all__ = ("show_scene",)
 
 _PERIOD = 0.1
 _LIST_PERIOD = 1.0
@@ -82,14 +81,7 @@ class _Backdrop(Object3D, component=Path(__file__).with_name("backdrop.js")):
 
 
 class _Drawn(Object3D, component=Path(__file__).with_name("drawing.js")):
-    """The drawing of one display.
-
-    Args:
-        address: Where the browser finds the newest one.
-    """
-
-    def __init__(self, address: str) -> None:
-        super().__init__(address)
+    """The drawing of one display; made with the address of the newest one."""
 
     def renew(self, address: str) -> None:
         """Let the browser show a newer one when it has time."""
@@ -97,8 +89,8 @@ class _Drawn(Object3D, component=Path(__file__).with_name("drawing.js")):
         self.run_method("update", address)
 
 
-def show_scene(system: System, frame: str, show: str, view: str) -> None:
-    """Build the page.
+class ScenePage:
+    """The view, and the displays in it.
 
     Args:
         system: The system.
@@ -106,24 +98,19 @@ def show_scene(system: System, frame: str, show: str, view: str) -> None:
         show: The displays, as the address holds them.
         view: ``orbit`` or ``top``.
     """
-    _ScenePage(system, read_setup(frame, show, view))
 
-
-class _ScenePage:
-    """The view, and the displays in it."""
-
-    def __init__(self, system: System, setup: Setup) -> None:
+    def __init__(self, system: System, frame: str, show: str, view: str) -> None:
         self._system = system
-        self._frame = frame = Frame(system, "3D", "/3d")
-        self._graph = frame.use(system.graph)
-        self._frames: Frames = frame.use(system.frames)
-        self._setup = setup
-        self._shown: list[_Shown] = []
+        setup = read_setup(frame, show, view)
+        page = Frame(system, "3D", "/3d")
+        self._graph = page.use(system.graph)
+        self._frames: Frames = page.use(system.frames)
+        self._shown: list[_ShownDisplay] = []
         self._keys: list[str] = []
         self._meshes = Meshes(system.node.context.environment, self._publish)
         self._chosen = bool(setup.frame)
         self._pointing = Pointing(system, lambda: str(self._fixed.value or ""))
-        with frame.content:
+        with page.content:
             self._add_controls(setup)
             self._pointing.add_row()
             with ui.element("div").classes(
@@ -140,28 +127,20 @@ class _ScenePage:
                 self._list = ui.column().classes("w-full gap-2 min-w-0")
         self._pointing.add_pointer(self._scene)
         Handling(self._scene, self._handles)
-        frame.keep(self)
-        frame.keep(self._pointing)
-        for look in setup.looks:
+        page.keep(self)
+        page.keep(self._pointing)
+        for look in setup.looks[: MOST_DISPLAYS + 1]:  # one too many says so
             self._show(look)
         self._look_from(None)
-        frame.show_fault(self._frames.fault)
-        frame.every(_LIST_PERIOD, self._refresh_lists)
-        frame.every(_PERIOD, self._refresh)
+        page.show_fault(self._frames.fault)
+        page.every(_LIST_PERIOD, self._refresh_lists)
+        page.every(_PERIOD, self._refresh)
 
-    def _add_controls(self, setup: Setup) -> None:
+    def _add_controls(self, setup: SceneSetup) -> None:
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-            self._fixed = (
-                ui.select(
-                    [setup.frame] if setup.frame else [],
-                    value=setup.frame or None,
-                    label="Fixed frame",
-                    with_input=True,
-                    on_change=self._choose_frame,
-                )
-                .props("dense options-dense")
-                .classes("w-44")
-            )
+            self._fixed = add_select(
+                "Fixed frame", setup.frame, self._choose_frame, with_input=True
+            ).classes("w-44")
             self._view = (
                 ui.toggle(_VIEWS, value=setup.view, on_change=self._look_from)
                 .props("dense no-caps flat")
@@ -191,11 +170,14 @@ class _ScenePage:
     # Displays.
 
     def _show(self, look: Look) -> None:
+        if len(self._shown) >= MOST_DISPLAYS:
+            ui.notify(f"a page shows {MOST_DISPLAYS} displays, which is the limit", type="negative")
+            return
         with self._list:
-            shown = _Shown(self._system, self._scene, look, self._changed, self._remove)
+            shown = _ShownDisplay(self._system, self._scene, look, self._changed, self._remove)
         self._shown.append(shown)
 
-    def _remove(self, shown: _Shown) -> None:
+    def _remove(self, shown: _ShownDisplay) -> None:
         self._shown.remove(shown)
         self._changed()
         shown.remove()
@@ -212,16 +194,15 @@ class _ScenePage:
 
     def _handles(self, name: str) -> HandleDisplay | None:
         """Return the display of interactive markers with a name; None if there is none."""
-        found = (one.display for one in self._shown if one.look.name == name)
-        return next((one for one in found if isinstance(one, HandleDisplay)), None)
+        displays = (entry.display for entry in self._shown if entry.look.name == name)
+        return next((view for view in displays if isinstance(view, HandleDisplay)), None)
 
     # The address of the page.
 
     def _changed(self) -> None:
         looks = tuple(shown.look for shown in self._shown)
         fixed = str(self._fixed.value or "") if self._chosen else ""
-        self._setup = Setup(fixed, looks, str(self._view.value))
-        address_of(format_setup(self._setup))
+        address_of(format_setup(SceneSetup(fixed, looks, str(self._view.value))))
 
     def _choose_frame(self) -> None:
         self._chosen = True
@@ -237,7 +218,7 @@ class _ScenePage:
     # Lists and states.
 
     def _refresh_lists(self) -> None:
-        shown = {one.look.name for one in self._shown} - {AXES, GRID}
+        shown = {entry.look.name for entry in self._shown} - {AXES, GRID}
         options = {
             name: f"{name} ({kind})"
             for name, kind in list_displays(self._graph.survey()).items()
@@ -245,14 +226,11 @@ class _ScenePage:
         }
         if self._add.options != options:
             self._add.set_options(options)
-        names = self._frames.names()
+        names = self._frames.buffer.frames()
         if not self._chosen and (best := self._frames.best()) and best != self._fixed.value:
             self._fixed.set_options(names, value=best)
             self._chosen = False
-        current = self._fixed.value
-        listed = sorted({*names, *((current,) if current else ())})
-        if self._fixed.options != listed:
-            self._fixed.set_options(listed, value=current)
+        offer_options(self._fixed, names)
 
     def _refresh(self) -> None:
         fixed = str(self._fixed.value or "")
@@ -261,7 +239,7 @@ class _ScenePage:
                 self._open_shown(shown)
             shown.refresh(fixed)
 
-    def _open_shown(self, shown: _Shown) -> None:
+    def _open_shown(self, shown: _ShownDisplay) -> None:
         try:
             display = open_display(
                 self._system, self._graph.survey(), self._frames, self._meshes, shown.look
@@ -271,7 +249,7 @@ class _ScenePage:
             shown.wait(str(error) if self._graph.complete else "")
 
 
-class _Shown:
+class _ShownDisplay:
     """One display: its settings, and its drawing in the view."""
 
     def __init__(
@@ -280,7 +258,7 @@ class _Shown:
         scene: ui.scene,
         look: Look,
         changed: Callable[[], None],
-        remove: Callable[[_Shown], None],
+        remove: Callable[[_ShownDisplay], None],
     ) -> None:
         self.look = look
         self.display: Display | None = None
@@ -288,14 +266,13 @@ class _Shown:
         self._scene = scene
         self._changed = changed
         self._key = ""
-        self._kind = ""
         self._number = 0
         self._drawn: _Drawn | ui.interactive_image | None = None
         with ui.column().classes("rosz-card w-full pl-3 pr-1 py-1 gap-0") as self._card:
             with ui.row().classes("w-full items-center gap-1 no-wrap"):
-                ui.checkbox(value=look.visible, on_change=self._switch).props(
-                    f'dense size=sm aria-label="Show {look.name}"'
-                )
+                ui.checkbox(
+                    value=look.visible, on_change=lambda event: self._set(visible=bool(event.value))
+                ).props(f'dense size=sm aria-label="Show {look.name}"')
                 ui.label(look.name).classes("font-semibold break-all grow min-w-0 pl-1")
                 self._tune = ui.button(icon="tune", on_click=self._toggle).props(
                     f'flat dense round size=sm aria-label="Settings of {look.name}"'
@@ -330,23 +307,7 @@ class _Shown:
                 ui.color_input(
                     "Color", value=shown, on_change=lambda e: self._color(e.value or "")
                 ).props("dense").classes("grow min-w-0")
-            if kind not in _OWN_SIZES:
-                ui.number(
-                    _UNITS.get(kind, "Size (m)"),
-                    value=self.look.size or None,
-                    min=0,
-                    step=0.1,
-                    on_change=lambda e: self._set(size=float(e.value or 0)),
-                ).props("dense").classes("w-20")
-            if kind in _NUMBERS:
-                key, title, form = _NUMBERS[kind]
-                ui.number(
-                    title,
-                    value=getattr(self.look, key) or None,
-                    min=0,
-                    precision=0 if form is int else None,
-                    on_change=lambda e: self._set(**{key: form(e.value or 0)}),
-                ).props("dense").classes("w-20")
+            self._add_numbers(kind)
             if kind in _TEXTS:
                 field, label = _TEXTS[kind]
                 ui.input(
@@ -355,21 +316,37 @@ class _Shown:
                     on_change=lambda e: self._set(**{field: str(e.value or "").strip("/")}),
                 ).props("dense debounce=400").classes("grow min-w-0")
 
+    def _add_numbers(self, kind: str) -> None:
+        if kind not in _OWN_SIZES:
+            ui.number(
+                _UNITS.get(kind, "Size (m)"),
+                value=self.look.size or None,
+                min=0,
+                step=0.1,
+                on_change=lambda e: self._set(size=float(e.value or 0)),
+            ).props("dense").classes("w-20")
+        if kind in _NUMBERS:
+            key, title, form = _NUMBERS[kind]
+            ui.number(
+                title,
+                value=getattr(self.look, key) or None,
+                min=0,
+                precision=0 if form is int else None,
+                on_change=lambda e: self._set(**{key: form(e.value or 0)}),
+            ).props("dense").classes("w-20")
+
     def _set(self, **changes: Any) -> None:
         self.look = msgspec.structs.replace(self.look, **changes)
         if self.display is not None:
             self.display.look = self.look
         self._changed()
 
-    def _switch(self, event: Any) -> None:
-        self._set(visible=bool(event.value))
-
     def _color(self, value: str) -> None:
         if value.startswith("#") or (not value and self.look.color.startswith("#")):
             self._set(color=value)
 
     def open(self, display: Display) -> None:
-        """Show what a display draws."""
+        """Show the drawing of a display."""
         self.display = display
         self._key = self._system.pictures.add(display.encoded)
         if display.kind in IMAGE_TYPES:
@@ -378,15 +355,14 @@ class _Shown:
         else:
             with self._scene:
                 self._drawn = _Drawn("")
-        self._kind = display.kind
         self._add_settings(display.kind)
 
     def wait(self, fault: str) -> None:
         """Say why there is nothing to show yet."""
-        _set(self._fault, fault)
+        show_text(self._fault, fault)
 
     def refresh(self, fixed: str) -> None:
-        """Let the browser draw what is new."""
+        """Send new drawings to the browser."""
         if self.display is None or self._drawn is None:
             return
         if self.display.refresh(fixed):
@@ -398,9 +374,9 @@ class _Shown:
                 self._drawn.set_source(address)
         if not isinstance(self._drawn, _Drawn):
             self._drawn.set_visibility(self.look.visible)
-        status = self.display.status
-        _set(self._status, f"{self._kind}: {status}" if status else self._kind)
-        _set(self._fault, self.display.fault)
+        kind, status = self.display.kind, self.display.status
+        show_text(self._status, f"{kind}: {status}" if status else kind)
+        show_text(self._fault, self.display.fault)
 
     def remove(self) -> None:
         """Take it off the page."""
@@ -414,9 +390,3 @@ class _Shown:
         self._system.pictures.remove(self._key)
         if self.display is not None:
             self.display.close()
-
-
-def _set(label: ui.label, text: str) -> None:
-    if label.text != text:
-        label.set_text(text)
-        label.set_visibility(bool(text))

@@ -4,38 +4,29 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from rosz.introspect.services import list_services
-from rosz.web.model import System, call_service, service_type
+from rosz.introspect import find_server, list_services
+from rosz.node.ros2 import request_type
+from rosz.web.model import System, call_service
 from rosz.web.pages.form import MessageForm
 from rosz.web.pages.layout import (
     Frame,
+    add_table,
     address_of,
     column,
     empty_state,
     offer_choice,
     query_of,
+    show_rows,
 )
-
-__all__ = ("show_services",)
 
 _PERIOD = 1.0
 _HIDDEN = ("/get_loggers", "/set_logger_level")
 
 
-def show_services(system: System, service: str) -> None:
-    """Build the page.
+class ServicesPage:
+    """The list of services, and the form for one that the address may name."""
 
-    Args:
-        system: The system.
-        service: Service to call; empty for none.
-    """
-    _Services(system, service)
-
-
-class _Services:
-    """The list of services, and the form."""
-
-    def __init__(self, system: System, service: str) -> None:
+    def __init__(self, system: System, service: str = "") -> None:
         self._system = system
         self._frame = frame = Frame(system, "Services", "/services")
         self._graph = frame.use(system.graph)
@@ -49,7 +40,7 @@ class _Services:
                 "rosz run rosz_tutorials add_two_ints_server.py",
             )
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
-                with ui.column().classes("rosz-card p-4 gap-2 min-w-0") as self._card:
+                with ui.column().classes("rosz-card p-4 gap-2 min-w-0"):
                     with ui.row().classes("w-full items-center"):
                         ui.label("Services").classes("text-base font-semibold")
                         ui.space()
@@ -64,20 +55,12 @@ class _Services:
         frame.every(_PERIOD, self._refresh)
 
     def _add_table(self, search: ui.input) -> ui.table:
-        table = (
-            ui.table(
-                rows=[],
-                columns=[
-                    column("name", "Service"),
-                    column("type", "Type", "rosz-soft rosz-wide"),
-                    column("nodes", "Node", "rosz-wide"),
-                ],
-                row_key="name",
-                pagination=12,
-            )
-            .classes("w-full")
-            .props("flat dense wrap-cells")
-        )
+        columns = [
+            column("name", "Service"),
+            column("type", "Type", "rosz-soft rosz-wide"),
+            column("nodes", "Node", "rosz-wide"),
+        ]
+        table = add_table(columns).props("wrap-cells")
         offer_choice(table, self._choose)
         search.on_value_change(lambda change: setattr(table, "filter", change.value or ""))
         return table
@@ -96,22 +79,21 @@ class _Services:
     def _refresh(self) -> None:
         own = self._system.node.name
         entries = [
-            one
-            for one in list_services(self._graph.survey().view)
-            if one.nodes != (own,) and (self._all.value or not one.name.endswith(_HIDDEN))
+            entry
+            for entry in list_services(self._graph.survey().view)
+            if entry.nodes != (own,) and (self._all.value or not entry.name.endswith(_HIDDEN))
         ]
-        self._types = {one.name: one.types[0] for one in entries}
+        self._types = {entry.name: entry.types[0] for entry in entries}
         rows = [
             {
-                "name": one.name,
-                "address": query_of("/services", service=one.name),
-                "type": ", ".join(one.types),
-                "nodes": ", ".join(one.nodes),
+                "name": entry.name,
+                "address": query_of("/services", service=entry.name),
+                "type": ", ".join(entry.types),
+                "nodes": ", ".join(entry.nodes),
             }
-            for one in entries
+            for entry in entries
         ]
-        if self._table.rows != rows:
-            self._table.rows = rows
+        show_rows(self._table, rows)
         if self._wanted in self._types:
             wanted, self._wanted = self._wanted, ""
             ui.timer(0, lambda: self._choose(wanted), once=True)
@@ -125,7 +107,8 @@ class _Services:
         address_of(query_of("/services", service=name))
         self._form.clear()
         view = self._graph.survey().view
-        cls = await self._frame.attempt(lambda: service_type(self._system.node, view, name))
+        node = self._system.node
+        cls = await self._frame.attempt(lambda: request_type(node, find_server(view, name)))
         if cls is not None and self._name.text == name:
             self._form.show(cls.Request)
             self._button.enable()

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 
 from rosz.errors import RoszError
-from rosz.introspect.fields import FieldPath
-from rosz.introspect.topics import find_topic, list_topics
+from rosz.introspect import FieldPath, find_topic, list_topics
 from rosz.names import short_type
-from rosz.web.model import Condition, Sending, System, TopicWatch, message_tree
+from rosz.web.model import FieldCondition, Sending, System, TopicWatch, message_tree
 from rosz.web.pages.form import MessageForm
 from rosz.web.pages.layout import (
     Frame,
+    add_select,
     address_of,
     bandwidth_text,
+    card,
+    offer_options,
+    query_of,
     rate_text,
+    show_text,
     size_text,
 )
-
-__all__ = ("show_topics",)
 
 _PERIOD = 0.25
 _LIST_PERIOD = 1.0
@@ -29,22 +30,19 @@ _MILLI = 1e3
 _FASTEST = 1000.0
 
 
-def show_topics(system: System, topic: str, field: str, condition: str) -> None:
-    """Build the page.
+class TopicsPage:
+    """The choice of a topic, and the topic.
 
     Args:
         system: The system.
         topic: Topic to show; empty for none.
         field: Path of the field to show; empty for the whole message.
-        condition: What a message has to fulfil to be shown; empty for all.
+        condition: A condition that a shown message fulfils; empty for all.
     """
-    _Topics(system, topic, field, condition)
 
-
-class _Topics:
-    """The choice of a topic, and the topic."""
-
-    def __init__(self, system: System, topic: str, field: str, condition: str) -> None:
+    def __init__(
+        self, system: System, topic: str = "", field: str = "", condition: str = ""
+    ) -> None:
         self._system = system
         self._frame = frame = Frame(system, "Topics", "/topics")
         self._graph = frame.use(system.graph)
@@ -54,28 +52,20 @@ class _Topics:
         self._fault = ""
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-                self._select = (
-                    ui.select(
-                        [topic] if topic else [],
-                        value=topic or None,
-                        label="Topic",
-                        with_input=True,
-                        new_value_mode="add-unique",
-                        on_change=lambda change: self._choose(change.value),
-                    )
-                    .props("dense options-dense clearable")
-                    .classes("grow min-w-52")
+                self._select = add_select(
+                    "Topic",
+                    topic,
+                    lambda change: self._choose(change.value),
+                    with_input=True,
+                    new_value_mode="add-unique",
                 )
-                self._path = (
-                    ui.input(
-                        "Field",
-                        value=field,
-                        placeholder="pose/position",
-                        on_change=lambda change: self._choose_field(change.value or ""),
-                    )
-                    .props("dense clearable debounce=400")
-                    .classes("w-40")
-                )
+                self._select.props("clearable").classes("grow min-w-52")
+                ui.input(
+                    "Field",
+                    value=field,
+                    placeholder="pose/position",
+                    on_change=lambda change: self._choose_field(change.value or ""),
+                ).props("dense clearable debounce=400").classes("w-40")
                 ui.input(
                     "Only if",
                     value=condition,
@@ -99,15 +89,11 @@ class _Topics:
     def _list(self) -> None:
         own = self._system.node.name
         survey = self._graph.survey()
-        found = [
-            one.name
-            for one in list_topics(token for token in survey.view.tokens if token.node_name != own)
-        ]
+        tokens = (token for token in survey.view.tokens if token.node_name != own)
+        rows = [entry.name for entry in list_topics(tokens)]
         chosen = self._select.value
-        options = sorted({*found, *((chosen,) if chosen else ())})
-        if self._select.options != options:
-            self._select.set_options(options, value=chosen)
-        if self._watch is None and chosen and chosen in found:
+        offer_options(self._select, rows)
+        if self._watch is None and chosen and chosen in rows:
             self._open(chosen)
 
     def _choose(self, topic: str | None) -> None:
@@ -127,20 +113,16 @@ class _Topics:
         self._choose(self._select.value)
 
     def _show_address(self) -> None:
-        query = {
-            "topic": self._select.value,
-            "field": self._field,
-            "condition": self._condition,
-        }
-        given = {name: value for name, value in query.items() if value}
-        address_of("/topics?" + urlencode(given, safe="/") if given else "/topics")
+        topic = self._select.value
+        query = query_of("/topics", topic=topic, field=self._field, condition=self._condition)
+        address_of(query)
 
     def _open(self, topic: str) -> None:
         try:
             self._system.permission.check("subscribe", topic)
             survey = self._graph.survey()
             find_topic(survey, topic)
-            condition = Condition(self._condition) if self._condition.strip() else None
+            condition = FieldCondition(self._condition) if self._condition.strip() else None
             self._watch = TopicWatch(self._system.node, survey, topic, condition)
         except RoszError as error:
             self._fault = str(error) if self._graph.complete else ""
@@ -188,7 +170,7 @@ class _Echo:
             )
 
     def clear(self) -> None:
-        """Forget what is shown."""
+        """Clear the shown message."""
         self._ids = set()
         self._shown = None
         self._flow.set_text("")
@@ -202,9 +184,7 @@ class _Echo:
     def show_nothing(self, topic: str | None, fault: str) -> None:
         """Say why nothing is shown."""
         text = fault or (f"Waiting for '{topic}'." if topic else "Choose a topic.")
-        if self._note.text != text:
-            self._note.set_text(text)
-        self._note.set_visibility(True)
+        show_text(self._note, text)
 
     def show_flow(self, watch: TopicWatch) -> None:
         """Show what flows."""
@@ -218,12 +198,10 @@ class _Echo:
         text = "" if watch.received else "No message has come yet."
         if watch.received and watch.message() is None:
             text = f"None of {watch.received} messages fulfils the condition."
-        if self._note.text != text:
-            self._note.set_text(text)
-            self._note.set_visibility(bool(text))
+        show_text(self._note, text)
 
     def show(self, tree: dict[str, Any]) -> None:
-        """Show a message; what is new in it is opened."""
+        """Show a message; new parts of it are opened."""
         if tree == self._shown:
             return
         self._shown = tree
@@ -235,10 +213,10 @@ class _Echo:
 
 
 def _ids(tree: dict[str, Any]) -> list[str]:
-    found = [tree["id"]] if tree.get("children") else []
+    ids = [tree["id"]] if tree.get("children") else []
     for child in tree.get("children", ()):
-        found += _ids(child)
-    return found
+        ids += _ids(child)
+    return ids
 
 
 class _Publish:
@@ -249,8 +227,7 @@ class _Publish:
         self._frame = frame
         self._sending: Sending | None = None
         frame.keep(self)
-        with ui.column().classes("rosz-card w-full p-4 gap-2 min-w-0"):
-            ui.label("Publish").classes("text-base font-semibold")
+        with card("Publish"):
             with ui.row().classes("w-full gap-3"):
                 self._topic = ui.input("Topic").props("dense").classes("grow")
                 self._type = (

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from rosz.errors import RoszError, UsageError
-from rosz.introspect.subscribe import find_token, topic_types
+from rosz.introspect import Survey, find_token, topic_types
+from rosz.lifecycle import Closable
+from rosz.node import Node
 from rosz.transforms import Pose
 from rosz.web.model import Frames, TopicWatch
 from rosz.web.scene.display import TopicDisplay
 from rosz.web.scene.drawing import Array, Drawing, moved
 from rosz.web.scene.sensors import MOST_POINTS, draw_points
 from rosz.web.scene.setup import DEPTH, Look
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("DepthDisplay", "draw_depth", "info_of")
 
 _METRES = {"32FC1": 1.0, "16UC1": 0.001, "mono16": 0.001}
 _FORMATS = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2"}
@@ -34,51 +30,42 @@ def info_of(topic: str) -> str:
 class DepthDisplay(TopicDisplay):
     """The newest depth image of a topic as points, in the colors of another image.
 
-    Args:
-        node: The node that subscribes to it.
-        survey: The running nodes.
-        look: Its settings; the name is ``depth:`` and the topic.
-        frames: The frames.
-
-    Raises:
-        NotFoundError: A topic does not exist.
-        TypeNotFound: A type is not known here.
-        DefinitionError: A definition differs from the one here.
+    The name of the display is ``depth:`` and the topic.
     """
 
     def __init__(self, node: Node, survey: Survey, look: Look, frames: Frames) -> None:
         topic = look.name.removeprefix(DEPTH + ":")
         self._info_topic = info_of(topic)
-        for one in filter(None, (self._info_topic, look.image)):
-            find_token(survey.view, one, topic_types(survey.view).get(one, ("",))[0])
+        for topic_name in filter(None, (self._info_topic, look.image)):
+            find_token(survey.view, topic_name, topic_types(survey.view).get(topic_name, ("",))[0])
         self._open: Callable[[str], TopicWatch] = lambda name: TopicWatch(node, survey, name)
         self._watches: list[TopicWatch] = []
+        super().__init__(node, survey, look, frames, topic, self._draw_depth)
+        self.kind = "DepthCloud"
+
+    def _subscribe(self) -> Sequence[Closable]:
         try:
-            super().__init__(node, survey, look, frames, topic, self._draw_depth)
+            for name in filter(None, (self._info_topic, self.look.image)):
+                self._watches.append(self._open(name))
+            return super()._subscribe()
         except RoszError:
             self._close_watches()
             raise
-        self.kind = "DepthCloud"
-
-    def _subscribe(self) -> None:
-        for name in filter(None, (self._info_topic, self.look.image)):
-            self._watches.append(self._open(name))
-        super()._subscribe()
 
     def _unsubscribe(self) -> None:
         super()._unsubscribe()
         self._close_watches()
 
     def _draw_depth(self, message: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
-        info, *images = [one.message() for one in self._watches] or [None]
+        info, *images = [watch.message() for watch in self._watches] or [None]
         if info is None:
             raise UsageError(f"no calibration of the camera has come on '{self._info_topic}'")
         return draw_depth(message, info, images[0] if images else None, pose, look, drawing)
 
     def _close_watches(self) -> None:
         watches, self._watches = self._watches, []
-        for one in watches:
-            one.close()
+        for watch in watches:
+            watch.close()
 
 
 def draw_depth(depth: Any, info: Any, image: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
@@ -102,8 +89,8 @@ def draw_depth(depth: Any, info: Any, image: Any, pose: Pose, look: Look, drawin
     step = int(np.ceil(np.sqrt(rows.size / MOST_POINTS))) or 1
     v, u = np.mgrid[0 : depth.height : step, 0 : depth.width : step]
     z = rows[::step, ::step]
-    known = np.isfinite(z) & (z > 0)
-    u, v, z = u[known], v[known], z[known]
+    valid = np.isfinite(z) & (z > 0)
+    u, v, z = u[valid], v[valid], z[valid]
     # An image of another size than that of the calibration is binned.
     across, down = depth.width / info.width, depth.height / info.height
     x = (u - info.k[2] * across) / (info.k[0] * across) * z
@@ -115,11 +102,7 @@ def draw_depth(depth: Any, info: Any, image: Any, pose: Pose, look: Look, drawin
 
 
 def _depths(image: Any) -> Array:
-    """Return the depths of an image in metres.
-
-    Raises:
-        UsageError: It is not an image of depths, or its data end early.
-    """
+    """Return the depths of an image in metres."""
     if image.encoding not in _FORMATS:
         raise UsageError(
             f"the encoding is '{image.encoding}'; expected a depth: {', '.join(_FORMATS)}"
@@ -130,19 +113,14 @@ def _depths(image: Any) -> Array:
         raise UsageError(f"the image has {len(image.data)} bytes of data; expected {needed}")
     lines = np.frombuffer(image.data, np.uint8, needed).reshape(image.height, image.step)
     packed = np.ascontiguousarray(lines[:, : image.width * kind.itemsize])
-    found: Array = packed.view(kind).astype(np.float32) * _METRES[image.encoding]
-    return found
+    depths: Array = packed.view(kind).astype(np.float32) * _METRES[image.encoding]
+    return depths
 
 
 def _colors(image: Any, across: Array, down: Array) -> Array:
-    """Return the colors of an image at parts of its width and height.
-
-    Raises:
-        MessageError: It is not an image.
-        UsageError: A library is not installed.
-    """
+    """Return the colors of an image at parts of its width and height."""
     try:
-        from rosz.bags.images import pixels
+        from rosz.images import pixels
     except ImportError as error:
         raise UsageError("pictures need libraries: pip install 'rosz[vision]'") from error
     picture = pixels(image, deep=False)

@@ -1,44 +1,33 @@
-"""One display: what it receives while it is shown, and its newest drawing."""
+"""One display: the messages that it receives while it is shown, and its newest drawing."""
 
 from __future__ import annotations
 
 import threading
-from collections import deque
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rosz.errors import MessageError, RoszError, TransformError
-from rosz.introspect.measure import read_stamp
-from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.introspect import Survey, find_class, find_token, read_stamp, topic_types
+from rosz.lifecycle import Closable
 from rosz.names import short_type
+from rosz.node import Node
+from rosz.queue import BoundedQueue
 from rosz.transforms import IDENTITY, Pose
 from rosz.web.model import Frames, ImageWatch, read_frame
-from rosz.web.scene import detections, poses, sensors, vectors
-from rosz.web.scene.colors import color_bytes
-from rosz.web.scene.drawing import MEDIA, Drawing
+from rosz.web.scene import poses, sensors
+from rosz.web.scene.drawing import MEDIA, Drawing, color_bytes
 from rosz.web.scene.setup import Look
 from rosz.web.scene.shapes import draw_axes
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = (
-    "DRAWN_TYPES",
-    "Display",
-    "FrameDisplay",
-    "ImageDisplay",
-    "TopicDisplay",
-)
 
 _QUEUE = 10
 _MOST_BYTES = 32 << 20
 
 _Draw = Callable[[Any, Pose, Look, Drawing], str]
 _DRAW: dict[str, _Draw] = {
-    "geometry_msgs/AccelStamped": vectors.draw_accel,
+    "geometry_msgs/AccelStamped": partial(poses.draw_pair, ("accel", "linear", "angular")),
     "geometry_msgs/Point": poses.draw_point,
     "geometry_msgs/PointStamped": poses.draw_point,
     "geometry_msgs/Polygon": poses.draw_polygon,
@@ -47,16 +36,16 @@ _DRAW: dict[str, _Draw] = {
     "geometry_msgs/PoseArray": poses.draw_poses,
     "geometry_msgs/PoseStamped": poses.draw_stamped_pose,
     "geometry_msgs/PoseWithCovarianceStamped": poses.draw_stamped_pose,
-    "geometry_msgs/TwistStamped": vectors.draw_twist,
-    "geometry_msgs/WrenchStamped": vectors.draw_wrench,
-    "jsk_recognition_msgs/BoundingBox": detections.draw_box,
-    "jsk_recognition_msgs/BoundingBoxArray": detections.draw_boxes,
-    "jsk_recognition_msgs/PolygonArray": detections.draw_polygons,
+    "geometry_msgs/TwistStamped": partial(poses.draw_pair, ("twist", "linear", "angular")),
+    "geometry_msgs/WrenchStamped": partial(poses.draw_pair, ("wrench", "force", "torque")),
+    "jsk_recognition_msgs/BoundingBox": poses.draw_boxes,
+    "jsk_recognition_msgs/BoundingBoxArray": poses.draw_boxes,
+    "jsk_recognition_msgs/PolygonArray": poses.draw_polygons,
     "nav_msgs/GridCells": poses.draw_cells,
     "nav_msgs/Odometry": poses.draw_stamped_pose,
     "nav_msgs/Path": poses.draw_path,
     "sensor_msgs/CameraInfo": sensors.draw_camera,
-    "sensor_msgs/Imu": vectors.draw_imu,
+    "sensor_msgs/Imu": poses.draw_imu,
     "sensor_msgs/LaserScan": sensors.draw_scan,
     "sensor_msgs/PointCloud": sensors.draw_old_cloud,
     "sensor_msgs/PointCloud2": sensors.draw_cloud,
@@ -65,32 +54,74 @@ _DRAW: dict[str, _Draw] = {
 DRAWN_TYPES = frozenset(_DRAW)
 
 
-class Display(Protocol):
+class Display:
     """A part of the view that draws one topic, the grid, the frames or the robot.
 
-    Attributes:
+    Args:
         look: Its settings.
         kind: Type of its messages, or ``Grid``, ``Frames`` or ``Robot``.
+
+    Attributes:
+        look: As given, or as changed since.
+        kind: As given.
         status: Description of its present drawing.
         fault: Reason why it draws nothing; empty if it draws.
     """
 
-    look: Look
-    kind: str
-    status: str
-    fault: str
+    def __init__(self, look: Look, kind: str) -> None:
+        self.look = look
+        self.kind = kind
+        self.status: str = ""
+        self.fault: str = ""
+        self._lock = threading.Lock()
+        self._version = 0
+        self._shown: object = None
+        self._subscriptions: Sequence[Closable] = ()
 
     def refresh(self, fixed: str) -> bool:
         """Return whether there is something new to draw in a fixed frame."""
+        raise NotImplementedError
 
     def encoded(self) -> tuple[bytes, str]:
         """Return the newest drawing and its media type."""
+        drawing = Drawing()
+        with np.errstate(all="ignore"):  # sensors send infinite and absurd values
+            self._draw_all(drawing)
+        return drawing.encode(), MEDIA
+
+    def _draw_all(self, drawing: Drawing) -> None:
+        raise NotImplementedError
+
+    def _subscribe(self) -> Sequence[Closable]:
+        """Return the subscriptions that it has while it is shown."""
+        return ()
+
+    def _forget(self) -> None:
+        """Forget all messages, with the lock."""
+
+    def _switch(self) -> None:
+        """Subscribe when it is shown, and unsubscribe when it is hidden."""
+        if self.look.visible == bool(self._subscriptions):
+            return
+        if self.look.visible:
+            self._subscriptions = self._subscribe()
+            return
+        self._unsubscribe()
+        with self._lock:
+            self._forget()
+            self._version += 1
+
+    def _unsubscribe(self) -> None:
+        subscriptions, self._subscriptions = self._subscriptions, ()
+        for subscription in subscriptions:
+            subscription.close()
 
     def close(self) -> None:
         """Unsubscribe."""
+        self._unsubscribe()
 
 
-class FrameDisplay:
+class FrameDisplay(Display):
     """The axes, names and ages of all frames.
 
     Args:
@@ -98,45 +129,34 @@ class FrameDisplay:
         frames: The frames.
     """
 
-    kind = "Frames"
     _OLD = 1.0
 
     def __init__(self, look: Look, frames: Frames) -> None:
-        self.look = look
-        self.status = ""
-        self.fault = ""
+        super().__init__(look, "Frames")
         self._frames = frames
         self._fixed = ""
-        self._shown: tuple[Look, str, int] | None = None
 
     def refresh(self, fixed: str) -> bool:
         """Return whether a frame moved."""
         self._fixed = fixed
         return self._shown != (self.look, fixed, self._frames.version)
 
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the axes of all frames."""
+    def _draw_all(self, drawing: Drawing) -> None:
         look, fixed = self.look, self._fixed
         self._shown = look, fixed, self._frames.version
-        drawing = Drawing()
-        if look.visible:
-            self._draw(look, fixed, drawing)
-        return drawing.encode(), MEDIA
-
-    def _draw(self, look: Look, fixed: str, drawing: Drawing) -> None:
-        found: list[Pose] = []
+        if not look.visible:
+            return
         missing: list[str] = []
         length = look.size or 0.3
         ends: list[tuple[float, float, float]] = []
         histories = self._frames.buffer.histories()
         places: dict[str, Pose] = {}
-        for name in self._frames.names():
+        for name in self._frames.buffer.frames():
             try:
                 places[name] = self._frames.find(fixed, name)
             except TransformError:
                 missing.append(name)
         for name, pose in places.items():
-            found.append(pose)
             age = self._frames.age(name)
             old = age is not None and age > self._OLD
             text = f"{name} ({age:.0f} s old)" if old else name
@@ -144,29 +164,21 @@ class FrameDisplay:
             parent = histories[name].newest.parent if name in histories else ""
             if parent in places:
                 ends += [pose.translation, places[parent].translation]
-        draw_axes(drawing, found, length)
+        draw_axes(drawing, list(places.values()), length)
         if ends:
             drawing.lines(np.array(ends), color_bytes("#c9a227"))
-        self.status = f"{len(found)} frames"
+        self.status = f"{len(places)} frames"
         some = ", ".join(missing[:3]) + (" …" if len(missing) > 3 else "")  # noqa: PLR2004
         self.fault = f"not connected with '{fixed}': {some}" if missing else ""
-        if not found and not missing:
+        if not places and not missing:
             self.fault = (
                 "no frame is known: start a node that sends transforms, such as"
                 " robot_state_publisher or static_transform_publisher"
             )
 
-    def close(self) -> None:
-        """Do nothing; the frames belong to all pages."""
 
-
-class ImageDisplay:
+class ImageDisplay(Display):
     """The newest image of a topic, beside the view.
-
-    Args:
-        node: The node that subscribes to it.
-        survey: The running nodes.
-        look: Its settings.
 
     Raises:
         NotFoundError: The topic does not exist.
@@ -174,30 +186,25 @@ class ImageDisplay:
     """
 
     def __init__(self, node: Node, survey: Survey, look: Look) -> None:
-        self.look = look
-        self.status = ""
-        self.fault = ""
         self._open: Callable[[], ImageWatch] = lambda: ImageWatch(node, survey, look.name)
-        self._watch: ImageWatch | None = self._open()
-        self.kind: str = short_type(self._watch.type_name)
+        watch = self._open()
+        super().__init__(look, short_type(watch.type_name))
+        self._watch: ImageWatch | None = watch
+        self._subscriptions = (watch,)
         self._shown = 0
-        if not look.visible:
-            self._switch()
+        self._switch()
 
-    def _switch(self) -> None:
-        """Subscribe when it is shown again, and unsubscribe when it is hidden."""
-        watch, self._watch = self._watch, None
-        if watch is None:
-            self._watch, self._shown = self._open(), 0
-        else:
-            self.status = ""
-            watch.close()
+    def _subscribe(self) -> Sequence[Closable]:
+        self._watch, self._shown = self._open(), 0
+        return (self._watch,)
+
+    def _forget(self) -> None:
+        self._watch, self.status = None, ""
 
     def refresh(self, fixed: str) -> bool:
         """Return whether there is a new image."""
         del fixed
-        if self.look.visible != (self._watch is not None):
-            self._switch()
+        self._switch()
         watch = self._watch
         if watch is None or watch.received == self._shown:
             return False
@@ -214,18 +221,39 @@ class ImageDisplay:
         if watch is None:
             raise MessageError(f"'{self.look.name}' is not shown")
         try:
-            found = watch.encoded()
+            picture = watch.encoded()
         except MessageError as error:
             self.fault = str(error)
             raise
         self.fault = ""
-        return found
+        return picture
 
-    def close(self) -> None:
-        """Unsubscribe."""
-        watch, self._watch = self._watch, None
-        if watch is not None:
-            watch.close()
+
+class ReceivingDisplay(Display):
+    """A display of the messages of one topic.
+
+    Args:
+        node: The node that subscribes to it.
+        survey: The running nodes.
+        look: Its settings.
+        frames: The frames.
+        topic: Full name of the topic; that of the display by default.
+
+    Raises:
+        NotFoundError: The topic does not exist.
+        TypeNotFound: Its type is not known here.
+        DefinitionError: Its definition differs from the one here.
+    """
+
+    def __init__(
+        self, node: Node, survey: Survey, look: Look, frames: Frames, topic: str = ""
+    ) -> None:
+        self._topic = topic = topic or look.name
+        token = find_token(survey.view, topic, topic_types(survey.view).get(topic, ("",))[0])
+        super().__init__(look, short_type(token.type_name))
+        self._node = node
+        self._cls: Any = find_class(node.context, token)
+        self._frames = frames
 
 
 class _Kept(NamedTuple):
@@ -237,23 +265,11 @@ class _Kept(NamedTuple):
     number: int
 
 
-class TopicDisplay:
+class TopicDisplay(ReceivingDisplay):
     """The newest message of a topic whose transform is known.
 
     A transform may come later than the message that needs it, so that some messages are kept.
-
-    Args:
-        node: The node that subscribes to it.
-        survey: The running nodes.
-        look: Its settings.
-        frames: The frames.
-        topic: Full name of the topic; that of the display by default.
-        draw: Function that draws a message; the one for its type by default.
-
-    Raises:
-        NotFoundError: The topic does not exist.
-        TypeNotFound: Its type is not known here.
-        DefinitionError: Its definition differs from the one here.
+    A function that draws a message may take the place of the one for its type.
     """
 
     def __init__(
@@ -265,34 +281,22 @@ class TopicDisplay:
         topic: str = "",
         draw: _Draw | None = None,
     ) -> None:
-        self._topic = topic = topic or look.name
-        token = find_token(survey.view, topic, topic_types(survey.view).get(topic, ("",))[0])
-        cls = find_class(node.context, token)
-        self.look = look
-        self.kind: str = short_type(token.type_name)
-        self.status: str = ""
-        self.fault: str = ""
+        super().__init__(node, survey, look, frames, topic)
         self.received: int = 0
         self._draw = draw or _DRAW[self.kind]
         self._trail = poses.Trail() if self.kind == "nav_msgs/Odometry" else None
-        self._frames = frames
-        self._stamped: bool = cls._has_header
-        self._decode = node.context.decoder(cls)
-        self._lock = threading.Lock()
-        self._kept: deque[_Kept] = deque(maxlen=_QUEUE)
-        self._bytes = 0
+        self._stamped: bool = self._cls._has_header
+        self._decode = node.context.decoder(self._cls)
+        self._kept: BoundedQueue[_Kept] = BoundedQueue(_QUEUE, _MOST_BYTES)
         self._chosen: tuple[_Kept, Pose] | None = None
-        self._wanted: tuple[Any, ...] = ()
-        self._shown: tuple[Any, ...] = ()
-        self._node = node
-        self._cls = cls
-        self._subscription: Any = None
-        if look.visible:
-            self._subscribe()
+        self._wanted: object = None
+        self._switch()
 
-    def _subscribe(self) -> None:
-        self._subscription = self._node.subscription(
-            self._topic, self._cls, self._receive, queue_size=_QUEUE, raw=True
+    def _subscribe(self) -> Sequence[Closable]:
+        return (
+            self._node.subscription(
+                self._topic, self._cls, self._receive, queue_size=_QUEUE, raw=True
+            ),
         )
 
     def _receive(self, payload: bytes) -> None:
@@ -301,74 +305,52 @@ class TopicDisplay:
             frame, stamp = read_frame(payload, self.kind), read_stamp(payload, self.kind)
         with self._lock:
             self.received += 1
-            self._kept.append(_Kept(payload, frame, stamp, self.received))
-            while len(self._kept) > 1 and sum(len(one.payload) for one in self._kept) > _MOST_BYTES:
-                self._kept.popleft()
+            self._kept.put(_Kept(payload, frame, stamp, self.received), len(payload))
             if self._trail is not None:
                 self._trail.add(self._decode(payload), self.look.keep)
 
     def refresh(self, fixed: str) -> bool:
         """Choose the newest message whose transform is known; return whether to draw it."""
-        if self.look.visible != (self._subscription is not None):
-            self._switch()
+        self._switch()
         with self._lock:
             kept = list(self._kept)
-        for number in range(len(kept) - 1, -1, -1):
-            one = kept[number]
+        for sample in reversed(kept):
             if not self._stamped:
-                return self._choose(fixed, one, IDENTITY)
+                return self._choose(fixed, sample, IDENTITY)
             try:
-                pose = self._frames.find(fixed, one.frame, one.stamp)
+                pose = self._frames.find(fixed, sample.frame, sample.stamp)
             except TransformError:
                 continue
             with self._lock:
-                while self._kept and self._kept[0] is not one:
-                    self._kept.popleft()
-            return self._choose(fixed, one, pose)
+                while self._kept and self._kept.oldest is not sample:
+                    self._kept.pop()
+            return self._choose(fixed, sample, pose)
         if kept:
             self.fault = self._frames.why_not(fixed, kept[-1].frame, kept[-1].stamp)
         return self._wanted != self._shown
 
-    def _choose(self, fixed: str, one: _Kept, pose: Pose) -> bool:
-        self._chosen = one, pose
-        self._wanted = self.look, fixed, one.number, pose
+    def _choose(self, fixed: str, sample: _Kept, pose: Pose) -> bool:
+        self._chosen = sample, pose
+        self._wanted = self.look, fixed, sample.number, pose
         return self._wanted != self._shown
 
-    def _switch(self) -> None:
-        """Subscribe when it is shown again, and unsubscribe when it is hidden."""
-        if self.look.visible:
-            self._subscribe()
-            return
-        self._unsubscribe()
-        with self._lock:
-            self._kept.clear()
-            if self._trail is not None:
-                self._trail.clear()
+    def _forget(self) -> None:
+        self._kept.clear()
+        if self._trail is not None:
+            self._trail.clear()
         self._chosen, self.status, self.fault = None, "", ""
         self._wanted = (self.look,)
 
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the drawing of the chosen message."""
+    def _draw_all(self, drawing: Drawing) -> None:
         chosen, look = self._chosen, self.look
         self._shown = self._wanted
-        drawing = Drawing()
         if chosen is not None and look.visible:
-            one, pose = chosen
+            sample, pose = chosen
             try:
-                self.status = self._draw(self._decode(one.payload), pose, look, drawing)
+                self.status = self._draw(self._decode(sample.payload), pose, look, drawing)
                 if self._trail is not None:
                     with self._lock:
                         self.status += f", {self._trail.draw(pose, look, drawing)} kept"
                 self.fault = ""
             except RoszError as error:
                 self.fault = str(error)
-        return drawing.encode(), MEDIA
-
-    def _unsubscribe(self) -> None:
-        subscription, self._subscription = self._subscription, None
-        if subscription is not None:
-            subscription.close()
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self._unsubscribe()

@@ -1,4 +1,4 @@
-"""The drawing of a display, in the coordinates of the fixed frame, as bytes for the browser.
+"""The drawing of a display in the coordinates of the fixed frame, its colors, and its bytes.
 
 A drawing is a header in JSON, whose length in four bytes comes first, and the numbers of its parts,
 as the graphics processor takes them. ``pages/drawing.js`` reads it.
@@ -7,6 +7,7 @@ as the graphics processor takes them. ``pages/drawing.js`` reads it.
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Iterable
 from typing import Any, Literal, TypeAlias
@@ -15,13 +16,16 @@ import numpy as np
 
 from rosz.transforms import Pose
 
-__all__ = ("MEDIA", "Array", "Drawing", "Shape", "matrix_of", "moved", "placed")
-
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 Shape: TypeAlias = Literal["cube", "sphere", "cylinder", "cone"]
 
 MEDIA = "application/octet-stream"
 """The media type of a drawing."""
+BY_HEIGHT, BY_INTENSITY, OWN = "height", "intensity", "rgb"
+_HEX = re.compile(r"#[0-9a-fA-F]{6}")
+_STOPS = np.array(
+    [(255, 0, 0), (255, 255, 0), (0, 255, 0), (0, 255, 255), (0, 0, 255), (255, 0, 255)]
+)
 _ALIGNMENT = 4
 _OPAQUE = 255
 _MOST_SHAPES = 200_000
@@ -41,7 +45,7 @@ class Drawing:
     Colors are arrays of bytes, red, green, blue and opacity: one for all, or one for each.
 
     Attributes:
-        handle: What one can do with the parts that are drawn next, for the browser; None for
+        handle: The actions that the parts drawn next allow, for the browser; None for
             nothing.
     """
 
@@ -49,11 +53,6 @@ class Drawing:
         self.handle: dict[str, object] | None = None
         self._header: list[dict[str, Any]] = []
         self._data: list[bytes] = []
-
-    @property
-    def empty(self) -> bool:
-        """Whether nothing is drawn."""
-        return not self._header
 
     def _add(self, head: dict[str, Any]) -> None:
         self._header.append(head if self.handle is None else {**head, "handle": self.handle})
@@ -185,10 +184,34 @@ def matrix_of(pose: Pose) -> Array:
 def moved(positions: Array, pose: Pose) -> Array:
     """Return positions in the frame in which a pose is given."""
     matrix = matrix_of(pose).astype(np.float32)
-    found: Array = np.asarray(positions, dtype=np.float32) @ matrix[:3, :3].T + matrix[:3, 3]
-    return found
+    points: Array = np.asarray(positions, dtype=np.float32) @ matrix[:3, :3].T + matrix[:3, 3]
+    return points
 
 
 def placed(pose: Pose, x: float = 1.0, y: float = 1.0, z: float = 1.0) -> Array:
     """Return the matrix of a shape at a pose, with its size in metres."""
     return matrix_of(pose) @ np.diag((x, y, z, 1.0))
+
+
+def color_bytes(text: str, fallback: str = "#2f6fed") -> Array:
+    """Return the four bytes of ``#rrggbb``; those of another color if it is not one."""
+    digits = text if _HEX.fullmatch(text) else fallback
+    return np.array([*bytes.fromhex(digits[1:]), 255], dtype=np.uint8)
+
+
+def css_of(r: float, g: float, b: float, a: float = 1.0) -> str:
+    """Return the CSS color of numbers from 0 to 1."""
+    red, green, blue = (round(min(max(part, 0.0), 1.0) * 255) for part in (r, g, b))
+    return f"rgba({red}, {green}, {blue}, {min(max(a, 0.0), 1.0):.3g})"
+
+
+def rainbow(values: Array) -> Array:
+    """Return a color for each value, red for the least and magenta for the greatest."""
+    finite = np.isfinite(values)
+    low, high = (values[finite].min(), values[finite].max()) if finite.any() else (0.0, 0.0)
+    reach = (high - low) or 1.0
+    part = np.where(finite, (values - low) / reach, 0.0) * (len(_STOPS) - 1)
+    colors = np.full((len(values), 4), 255, dtype=np.uint8)
+    for channel in range(3):
+        colors[:, channel] = np.interp(part, range(len(_STOPS)), _STOPS[:, channel])
+    return colors

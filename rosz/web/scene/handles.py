@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from rosz.errors import RoszError, TransformError
-from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.introspect import Survey
+from rosz.lifecycle import Closable
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Point, Quaternion, Vector3
 from rosz.msgs.geometry_msgs.msg import Pose as PoseMessage
@@ -23,20 +23,15 @@ from rosz.msgs.visualization_msgs.msg import (
     Marker,
     MenuEntry,
 )
-from rosz.names import short_type
+from rosz.node import Node
 from rosz.transforms import Pose, compose, invert
 from rosz.web.model import Frames
-from rosz.web.scene.drawing import MEDIA, Drawing, matrix_of
+from rosz.web.scene.display import ReceivingDisplay
+from rosz.web.scene.drawing import Drawing, matrix_of
 from rosz.web.scene.markers import draw_marker
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.poses import pose_from, rotation_from
 from rosz.web.scene.setup import Look
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("FEEDBACK", "HANDLE_TYPE", "HandleDisplay", "Held", "default_markers")
 
 HANDLE_TYPE = "visualization_msgs/InteractiveMarkerUpdate"
 _UPDATE, _FULL, FEEDBACK = "update", "update_full", "feedback"
@@ -87,28 +82,11 @@ class _Handle:
         self.wanted: Pose | None = None
         self.frame: Pose | None = None
 
-    def place(self, message: Any, *, held: bool) -> None:
-        """Take a pose from the server; one that is held takes it when it is let go."""
-        if held:
-            self.wanted = pose_from(message)
-        else:
-            self.pose = pose_from(message)
 
-
-class HandleDisplay:
+class HandleDisplay(ReceivingDisplay):
     """The interactive markers of a server, by the topic of its updates.
 
-    Args:
-        node: The node that subscribes to it and reports what is done.
-        survey: The running nodes.
-        look: Its settings.
-        frames: The frames.
-        meshes: The meshes that markers name.
-        objection: Reason why the page may not report; empty if it may.
-
-    Raises:
-        NotFoundError: The topic does not exist.
-        DefinitionError: Its definition differs from the one here.
+    The node also reports the user's actions, unless there is an objection, which is shown.
     """
 
     def __init__(
@@ -120,25 +98,14 @@ class HandleDisplay:
         meshes: Meshes,
         objection: str = "",
     ) -> None:
-        token = find_token(survey.view, look.name, topic_types(survey.view)[look.name][0])
-        find_class(node.context, token)
-        self.look = look
-        self.kind: str = short_type(token.type_name)
-        self.status: str = ""
-        self.fault: str = ""
+        super().__init__(node, survey, look, frames)
         self._space = look.name.removesuffix(_UPDATE)
-        self._node = node
-        self._frames = frames
         self._meshes = meshes
         self._objection = objection
-        self._lock = threading.Lock()
         self._handles: dict[str, _Handle] = {}
         self._held = ""
         self._sequence = "", 0
-        self._version = 0
         self._refused = ""
-        self._shown: tuple[Any, ...] = ()
-        self._subscriptions: list[Any] = []
         self._publisher: Any = None
         if not objection:
             self._publisher = node.publisher(self._space + FEEDBACK, _Feedback, queue_size=_QUEUE)
@@ -151,7 +118,7 @@ class HandleDisplay:
             if message.server_id == server and message.seq_num < newest:
                 return  # of before an update that came first
             self._sequence = message.server_id, message.seq_num
-            self._handles = {one.name: _Handle(one) for one in message.markers}
+            self._handles = {marker.name: _Handle(marker) for marker in message.markers}
             self._version += 1
 
     def _update(self, message: Any) -> None:
@@ -159,12 +126,15 @@ class HandleDisplay:
             return
         with self._lock:
             self._sequence = message.server_id, message.seq_num
-            for one in message.markers:
-                self._handles[one.name] = _Handle(one)
-            for one in message.poses:
-                if one.name in self._handles:
-                    self._handles[one.name].marker.header = one.header
-                    self._handles[one.name].place(one.pose, held=one.name == self._held)
+            for change in message.markers:
+                self._handles[change.name] = _Handle(change)
+            for change in message.poses:
+                if (handle := self._handles.get(change.name)) is not None:
+                    handle.marker.header = change.header
+                    if change.name == self._held:  # it takes the pose when it is let go
+                        handle.wanted = pose_from(change.pose)
+                    else:
+                        handle.pose = pose_from(change.pose)
             for name in message.erases:
                 self._handles.pop(name, None)
             self._version += 1
@@ -173,65 +143,56 @@ class HandleDisplay:
 
     def refresh(self, fixed: str) -> bool:
         """Find where the markers are; return whether there is something new to draw."""
-        if self.look.visible != bool(self._subscriptions):
-            self._switch()
+        self._switch()
         faults: dict[str, int] = {}
         with self._lock:
-            for one in self._handles.values():
-                frame = one.marker.header.frame_id.removeprefix("/")
-                stamp = one.marker.header.stamp.to_nsec()
+            for handle in self._handles.values():
+                frame = handle.marker.header.frame_id.removeprefix("/")
+                stamp = handle.marker.header.stamp.to_nsec()
                 try:
                     place = self._frames.find(fixed, frame, stamp)
                 except TransformError:
                     why = self._frames.why_not(fixed, frame, stamp)
                     faults[why] = faults.get(why, 0) + 1
                     place = None
-                self._version += place != one.frame
-                one.frame = place
+                self._version += place != handle.frame
+                handle.frame = place
             texts = [f"{count} not drawn: {why}" for why, count in faults.items()]
-            said = (self._objection, self._refused)
-            self.fault = "; ".join([*texts[:2], *(one for one in said if one)])
+            reports = (self._objection, self._refused)
+            self.fault = "; ".join([*texts[:2], *(report for report in reports if report)])
             return self._shown != (self._version, self.look)
 
-    def _switch(self) -> None:
-        """Subscribe when it is shown, and unsubscribe when it is hidden."""
-        if self.look.visible:
-            subscribe, space = self._node.subscription, self._space
-            self._subscriptions = [
-                subscribe(
-                    space + _UPDATE, InteractiveMarkerUpdate, self._update, queue_size=_QUEUE
-                ),
-                subscribe(space + _FULL, InteractiveMarkerInit, self._init, queue_size=_QUEUE),
-            ]
-            return
-        self._unsubscribe()
-        with self._lock:
-            self._handles.clear()
-            self._sequence = "", 0
-            self._version += 1
+    def _subscribe(self) -> Sequence[Closable]:
+        subscribe, space = self._node.subscription, self._space
+        return (
+            subscribe(space + _UPDATE, InteractiveMarkerUpdate, self._update, queue_size=_QUEUE),
+            subscribe(space + _FULL, InteractiveMarkerInit, self._init, queue_size=_QUEUE),
+        )
 
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the drawing of all markers, with what one can do with their parts."""
-        drawing = Drawing()
+    def _forget(self) -> None:
+        self._handles.clear()
+        self._sequence = "", 0
+
+    def _draw_all(self, drawing: Drawing) -> None:
+        """Draw all markers, with the actions that their parts allow."""
         faults: list[str] = []
         with self._lock:
             self._shown = self._version, self.look
             shown = [
-                (one, one.frame)
-                for one in self._handles.values()
-                if one.frame is not None and self.look.visible
+                (handle, handle.frame)
+                for handle in self._handles.values()
+                if handle.frame is not None and self.look.visible
             ]
-            for one, frame in shown:
-                faults += self._draw(one, frame, drawing)
-        self.status = ", ".join(one.marker.name for one, _ in shown) or "no markers"
+            for handle, frame in shown:
+                faults += self._draw(handle, frame, drawing)
+        self.status = ", ".join(handle.marker.name for handle, _ in shown) or "no markers"
         self._refused = faults[0] if faults else ""
-        return drawing.encode(), MEDIA
 
-    def _draw(self, one: _Handle, frame: Pose, drawing: Drawing) -> list[str]:
-        """Draw a marker, and return what is not drawn."""
-        marker = one.marker
+    def _draw(self, handle: _Handle, frame: Pose, drawing: Drawing) -> list[str]:
+        """Draw a marker, and return the reasons for the parts that are not drawn."""
+        marker = handle.marker
         faults: list[str] = []
-        pose, scale = compose(frame, one.pose), marker.scale or 1.0
+        pose, scale = compose(frame, handle.pose), marker.scale or 1.0
         for control in marker.controls:
             base = pose
             if control.orientation_mode == _Control.FIXED:
@@ -252,7 +213,7 @@ class HandleDisplay:
     def _handle(
         self, marker: Any, control: Any, pose: Pose, base: Pose
     ) -> dict[str, object] | None:
-        """Return what the browser needs to move a marker by a control; None if it cannot."""
+        """Return the data with which the browser moves a marker by a control; None if it cannot."""
         if self._objection or control.interaction_mode == _Control.NONE:
             return None
         turned = Pose((0.0, 0.0, 0.0), rotation_from(control.orientation))
@@ -269,39 +230,39 @@ class HandleDisplay:
             "axis": axis.tolist(),
         }
 
-    # What one does in the browser.
+    # The user's actions in the browser.
 
     def menu(self, name: str) -> list[MenuEntry]:
         """Return the entries of the menu of a marker, all levels in one list."""
         with self._lock:
-            one = self._handles.get(name)
-            return [] if one is None else list(one.marker.menu_entries)
+            handle = self._handles.get(name)
+            return [] if handle is None else list(handle.marker.menu_entries)
 
-    def take(self, held: Held) -> None:
+    def take(self, drag: Held) -> None:
         """Move a marker, and report what happened to its server."""
         with self._lock:
-            one = self._handles.get(held.marker)
-            if one is None or one.frame is None or held.event not in _EVENTS:
+            handle = self._handles.get(drag.marker)
+            if handle is None or handle.frame is None or drag.event not in _EVENTS:
                 return
-            if held.event in {"down", "move"}:
-                self._held = held.marker
-            if held.event == "move":
-                one.pose = compose(invert(one.frame), Pose(held.position, held.rotation))
-            report = _report(one, one.frame, held)
-            if held.event == "up":
+            if drag.event in {"down", "move"}:
+                self._held = drag.marker
+            if drag.event == "move":
+                handle.pose = compose(invert(handle.frame), Pose(drag.position, drag.rotation))
+            report = _report(handle, handle.frame, drag)
+            if drag.event == "up":
                 self._held = ""
-                one.pose, one.wanted = one.wanted or one.pose, None
+                handle.pose, handle.wanted = handle.wanted or handle.pose, None
             self._version += 1
-        report.event_type = _EVENTS[held.event]
+        report.event_type = _EVENTS[drag.event]
         self._send(report)
 
-    def choose(self, held: Held, entry: int) -> None:
+    def choose(self, drag: Held, entry: int) -> None:
         """Report that an entry of the menu of a marker was chosen."""
         with self._lock:
-            one = self._handles.get(held.marker)
-            if one is None or one.frame is None:
+            handle = self._handles.get(drag.marker)
+            if handle is None or handle.frame is None:
                 return
-            report = _report(one, one.frame, held)
+            report = _report(handle, handle.frame, drag)
         report.event_type, report.menu_entry_id = _Feedback.MENU_SELECT, entry
         self._send(report)
 
@@ -310,40 +271,30 @@ class HandleDisplay:
             report.client_id = f"{self._node.name}{self.look.name}"
             self._publisher.publish(report)
 
-    def _unsubscribe(self) -> None:
-        subscriptions, self._subscriptions = self._subscriptions, []
-        for one in subscriptions:
-            one.close()
-
     def close(self) -> None:
         """Unsubscribe, and withdraw the reports."""
-        self._unsubscribe()
+        super().close()
         if self._publisher is not None:
             self._publisher.close()
 
 
-def _report(one: _Handle, frame: Pose, held: Held) -> Any:
-    """Return what is reported of a marker, in the frame of its server."""
-    header = one.marker.header
+def _report(handle: _Handle, frame: Pose, drag: Held) -> Any:
+    """Return the feedback message of a marker, in the frame of its server."""
+    header = handle.marker.header
     report = _Feedback(
         header=Header(stamp=Time.from_nsec(header.stamp.to_nsec()), frame_id=header.frame_id),
-        marker_name=held.marker,
-        control_name=held.control,
-        pose=PoseMessage(Point(*one.pose.translation), Quaternion(*one.pose.rotation)),
+        marker_name=drag.marker,
+        control_name=drag.control,
+        pose=PoseMessage(Point(*handle.pose.translation), Quaternion(*handle.pose.rotation)),
     )
-    if held.point is not None:
-        point = compose(invert(frame), Pose(held.point, (0.0, 0.0, 0.0, 1.0)))
+    if drag.point is not None:
+        point = compose(invert(frame), Pose(drag.point, (0.0, 0.0, 0.0, 1.0)))
         report.mouse_point, report.mouse_point_valid = Point(*point.translation), True
     return report
 
 
 def default_markers(control: Any, scale: float) -> Iterable[Any]:
-    """Return what a control looks like that says nothing of it, as in rviz.
-
-    Args:
-        control: The control.
-        scale: Scale of its marker.
-    """
+    """Return the default appearance of a control without markers, as in rviz."""
     axis = np.abs(matrix_of(Pose((0.0, 0.0, 0.0), rotation_from(control.orientation)))[:3, 0])
     red, green, blue = (axis / axis.max()).tolist()
     color = ColorRGBA(red, green, blue, 0.5)

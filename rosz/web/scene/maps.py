@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from rosz.errors import TransformError, UsageError
-from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.introspect import Survey
+from rosz.lifecycle import Closable
 from rosz.msgs.map_msgs.msg import OccupancyGridUpdate
-from rosz.names import short_type
+from rosz.node import Node
 from rosz.transforms import Pose, compose
 from rosz.web.model import Frames
-from rosz.web.scene.drawing import MEDIA, Array, Drawing, placed
+from rosz.web.scene.display import ReceivingDisplay
+from rosz.web.scene.drawing import Array, Drawing, placed
 from rosz.web.scene.poses import pose_from
 from rosz.web.scene.setup import Look
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("MAP_TYPE", "UPDATES", "MapDisplay", "draw_map", "read_cells", "update_cells")
 
 MAP_TYPE = "nav_msgs/OccupancyGrid"
 UPDATES = "_updates"
@@ -30,53 +26,31 @@ _MOST_CELLS = 4096
 _QUEUE = 10
 
 
-class MapDisplay:
+class MapDisplay(ReceivingDisplay):
     """The newest map of a topic, with the updates since.
 
-    It stays where its frame is now, not where it was when the map was made.
-
-    Args:
-        node: The node that subscribes to it.
-        survey: The running nodes.
-        look: Its settings.
-        frames: The frames.
-        unseen: Reason why the page may not receive updates; empty if it may.
-
-    Raises:
-        NotFoundError: The topic does not exist.
-        DefinitionError: Its definition differs from the one here.
+    It stays where its frame is now, not where it was when the map was made. ``unseen`` is the
+    reason why the page may not receive updates; empty if it may.
     """
-
-    kind = MAP_TYPE
 
     def __init__(
         self, node: Node, survey: Survey, look: Look, frames: Frames, unseen: str = ""
     ) -> None:
-        token = find_token(survey.view, look.name, topic_types(survey.view)[look.name][0])
-        self.look = look
-        self.kind = short_type(token.type_name)
-        self.status: str = ""
-        self.fault: str = ""
-        self._node = node
-        self._cls = find_class(node.context, token)
-        self._frames = frames
+        super().__init__(node, survey, look, frames)
         self._unseen = unseen
-        self._lock = threading.Lock()
         self._map: Any = None
         self._rows: Array = np.zeros((0, 0), np.uint8)
         self._updates = 0
         self._refused = unseen
-        self._version = 0
         self._place: tuple[str, Pose] | None = None
-        self._shown: tuple[Any, ...] = ()
-        self._subscriptions: list[Any] = []
 
     def _receive(self, message: Any) -> None:
         with self._lock:
             self._version += 1
             self._map, self._updates, self._refused = None, 0, self._unseen
             try:
-                self._rows = read_cells(message)
+                size = message.info.width, message.info.height
+                self._rows = read_cells(message.data, *size, "map")
             except UsageError as error:
                 self._refused = str(error)
                 return
@@ -96,12 +70,11 @@ class MapDisplay:
 
     def refresh(self, fixed: str) -> bool:
         """Return whether the map changed or moved."""
-        if self.look.visible != bool(self._subscriptions):
-            self._switch()
+        self._switch()
         with self._lock:
-            found, fault = self._map, self._refused
-        if found is not None:
-            frame = found.header.frame_id.removeprefix("/")
+            grid, fault = self._map, self._refused
+        if grid is not None:
+            frame = grid.header.frame_id.removeprefix("/")
             try:
                 self._place = fixed, self._frames.find(fixed, frame)
             except TransformError:
@@ -111,52 +84,26 @@ class MapDisplay:
         self.fault = fault
         return self._shown != (self.look, self._version, self._place)
 
-    def _switch(self) -> None:
-        """Subscribe when it is shown, and unsubscribe when it is hidden."""
-        if not self.look.visible:
-            self.close()
-            with self._lock:
-                self._map, self._version = None, self._version + 1
-            self.status, self._place = "", None
-            return
-        self._subscriptions = [
-            self._node.subscription(self.look.name, self._cls, self._receive, queue_size=_QUEUE)
-        ]
-        if not self._unseen:
-            self._subscriptions.append(
-                self._node.subscription(
-                    self.look.name + UPDATES, OccupancyGridUpdate, self._update, queue_size=_QUEUE
-                )
-            )
+    def _subscribe(self) -> Sequence[Closable]:
+        subscribe, topic = self._node.subscription, self.look.name
+        grids = subscribe(topic, self._cls, self._receive, queue_size=_QUEUE)
+        if self._unseen:
+            return (grids,)
+        updates = subscribe(topic + UPDATES, OccupancyGridUpdate, self._update, queue_size=_QUEUE)
+        return grids, updates
 
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the drawing of the map."""
+    def _forget(self) -> None:
+        self._map, self._place, self.status = None, None, ""
+
+    def _draw_all(self, drawing: Drawing) -> None:
         with self._lock:
             place = self._place
             self._shown = self.look, self._version, place
-            found, updates = self._map, self._updates
-            rows = self._rows.copy() if found is not None else self._rows
-        drawing = Drawing()
-        if found is not None and place is not None and self.look.visible:
-            text = draw_map(found.info, rows, place[1], self.look, drawing)
+            grid, updates = self._map, self._updates
+            rows = self._rows.copy() if grid is not None else self._rows
+        if grid is not None and place is not None and self.look.visible:
+            text = draw_map(grid.info, rows, place[1], self.look, drawing)
             self.status = f"{text}, {updates} updates" if updates else text
-        return drawing.encode(), MEDIA
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        subscriptions, self._subscriptions = self._subscriptions, []
-        for one in subscriptions:
-            one.close()
-
-
-def read_cells(message: Any) -> Array:
-    """Return the cells of a map as bytes, in rows along x.
-
-    Raises:
-        UsageError: The number of cells is not that of its size.
-    """
-    info = message.info
-    return _read_rows(message.data, info.width, info.height, "map")
 
 
 def update_cells(rows: Array, update: Any) -> None:
@@ -165,7 +112,7 @@ def update_cells(rows: Array, update: Any) -> None:
     Raises:
         UsageError: It is not within the map, or the number of its cells is not that of its size.
     """
-    part = _read_rows(update.data, update.width, update.height, "update of the map")
+    part = read_cells(update.data, update.width, update.height, "update of the map")
     x, y = update.x, update.y
     height, width = rows.shape
     if x < 0 or y < 0 or x + update.width > width or y + update.height > height:
@@ -176,7 +123,12 @@ def update_cells(rows: Array, update: Any) -> None:
     rows[y : y + update.height, x : x + update.width] = part
 
 
-def _read_rows(data: Any, width: int, height: int, what: str) -> Array:
+def read_cells(data: Any, width: int, height: int, what: str) -> Array:
+    """Return the cells of a map as bytes, in rows along x.
+
+    Raises:
+        UsageError: The number of cells is not that of the size.
+    """
     cells = np.frombuffer(_bytes_of(data), np.uint8)
     if len(cells) != width * height:
         raise UsageError(f"the {what} has {len(cells)} cells; expected {width} x {height}")
@@ -191,15 +143,7 @@ def _bytes_of(data: Any) -> bytes:
 
 
 def draw_map(info: Any, rows: Array, pose: Pose, look: Look, drawing: Drawing) -> str:
-    """Draw the cells of an OccupancyGrid, with the colors of rviz.
-
-    Args:
-        info: The MapMetaData of the map.
-        rows: Its cells.
-        pose: Pose of its frame in the fixed frame.
-        look: Settings of the display.
-        drawing: The drawing.
-    """
+    """Draw the cells of an OccupancyGrid by its MapMetaData, with the colors of rviz."""
     if not rows.size:
         return "0 cells"
     step = -(-max(rows.shape) // _MOST_CELLS)

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rosz.errors import RoszError, TransformError
-from rosz.introspect.subscribe import find_class, find_token, topic_types
+from rosz.introspect import Survey
+from rosz.lifecycle import Closable
 from rosz.msgs.visualization_msgs.msg import Marker
-from rosz.names import short_type
+from rosz.node import Node
 from rosz.transforms import Pose, compose
 from rosz.web.model import Frames
-from rosz.web.scene.colors import css_of
-from rosz.web.scene.drawing import MEDIA, Array, Drawing, matrix_of, moved
+from rosz.web.scene.display import ReceivingDisplay
+from rosz.web.scene.drawing import Array, Drawing, Shape, css_of, moved, placed
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.poses import pose_from
 from rosz.web.scene.setup import Look
 from rosz.web.scene.shapes import draw_arrows, draw_bars
-
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-    from rosz.node import Node
-
-__all__ = ("MARKER_TYPES", "MarkerDisplay", "draw_marker")
 
 MARKER_TYPES = frozenset({"visualization_msgs/Marker", "visualization_msgs/MarkerArray"})
 _QUEUE = 100
@@ -47,41 +42,16 @@ class _Placed:
         self.pose: Pose | None = None
 
 
-class MarkerDisplay:
-    """The markers of a topic of Marker or MarkerArray messages.
-
-    Args:
-        node: The node that subscribes to it.
-        survey: The running nodes.
-        look: Its settings.
-        frames: The frames.
-        meshes: The meshes that markers name.
-
-    Raises:
-        NotFoundError: The topic does not exist.
-        TypeNotFound: Its type is not known here.
-        DefinitionError: Its definition differs from the one here.
-    """
+class MarkerDisplay(ReceivingDisplay):
+    """The markers of a topic of Marker or MarkerArray messages, with the meshes that they name."""
 
     def __init__(
         self, node: Node, survey: Survey, look: Look, frames: Frames, meshes: Meshes
     ) -> None:
-        token = find_token(survey.view, look.name, topic_types(survey.view)[look.name][0])
-        self.look = look
-        self.kind: str = short_type(token.type_name)
-        self.status: str = ""
-        self.fault: str = ""
-        self._node = node
-        self._cls = find_class(node.context, token)
-        self._frames = frames
+        super().__init__(node, survey, look, frames)
         self._meshes = meshes
-        self._lock = threading.Lock()
         self._placed: dict[tuple[str, int], _Placed] = {}
-        self._version = 0
         self._refused = ""
-        self._fixed = ""
-        self._shown: tuple[Any, ...] = ()
-        self._subscription: Any = None
 
     # Receiving messages.
 
@@ -112,29 +82,27 @@ class MarkerDisplay:
 
     def refresh(self, fixed: str) -> bool:
         """Find where the markers are; return whether there is something new to draw."""
-        if self.look.visible != (self._subscription is not None):
-            self._switch()
+        self._switch()
         now = self._node.now()
         faults: dict[str, int] = {}
         with self._lock:
-            over = [key for key, one in self._placed.items() if one.ends <= now]
+            over = [key for key, entry in self._placed.items() if entry.ends <= now]
             for key in over:
                 del self._placed[key]
             changed = bool(over)
-            for one in self._placed.values():
-                changed = self._place(one, fixed, faults) or changed
+            for entry in self._placed.values():
+                changed = self._place(entry, fixed, faults) or changed
             self._version += changed
-            self._fixed = fixed
             texts = [f"{count} not drawn: {why}" for why, count in faults.items()]
             self.fault = "; ".join([*texts[:2], *([self._refused] if self._refused else [])])
             return self._shown != (self._version, self.look)
 
-    def _place(self, one: _Placed, fixed: str, faults: dict[str, int]) -> bool:
+    def _place(self, entry: _Placed, fixed: str, faults: dict[str, int]) -> bool:
         """Return whether a marker came to another place."""
-        locked = one.marker.frame_locked
-        if one.fixed == fixed and one.pose is not None and not locked:
+        locked = entry.marker.frame_locked
+        if entry.fixed == fixed and entry.pose is not None and not locked:
             return False
-        header = one.marker.header
+        header = entry.marker.header
         frame = header.frame_id.removeprefix("/")
         stamp = 0 if locked else header.stamp.to_nsec()
         try:
@@ -142,60 +110,42 @@ class MarkerDisplay:
         except TransformError:
             why = self._frames.why_not(fixed, frame, stamp)
             faults[why] = faults.get(why, 0) + 1
-            known, one.pose = one.pose, one.pose if one.fixed == fixed else None
-            return known is not one.pose
-        known, one.pose, one.fixed = one.pose, pose, fixed
-        return known != pose
+            previous, entry.pose = entry.pose, entry.pose if entry.fixed == fixed else None
+            return previous is not entry.pose
+        previous, entry.pose, entry.fixed = entry.pose, pose, fixed
+        return previous != pose
 
-    def _switch(self) -> None:
-        """Subscribe when it is shown, and unsubscribe when it is hidden."""
-        if self.look.visible:
-            self._subscription = self._node.subscription(
-                self.look.name, self._cls, self._receive, queue_size=_QUEUE
-            )
-            return
-        self.close()
-        with self._lock:
-            self._placed.clear()
-            self._version += 1
+    def _subscribe(self) -> Sequence[Closable]:
+        name, subscribe = self.look.name, self._node.subscription
+        return (subscribe(name, self._cls, self._receive, queue_size=_QUEUE),)
 
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the drawing of all markers."""
+    def _forget(self) -> None:
+        self._placed.clear()
+
+    def _draw_all(self, drawing: Drawing) -> None:
         with self._lock:
             self._shown = self._version, self.look
-            placed = [one for one in self._placed.values() if one.pose is not None]
+            shown = [entry for entry in self._placed.values() if entry.pose is not None]
             namespaces = len({ns for ns, _ in self._placed})
-        drawing = Drawing()
         faults: list[str] = []
-        for one in placed if self.look.visible else ():
-            if one.pose is None:
+        for marker in shown if self.look.visible else ():
+            if marker.pose is None:
                 continue
             try:
-                found = draw_marker(one.marker, one.pose, self._meshes, drawing)
+                faults_of_marker = draw_marker(marker.marker, marker.pose, self._meshes, drawing)
             except (RoszError, ValueError) as error:
-                found = (str(error),)
-            faults += [f"marker {one.marker.ns}/{one.marker.id}: {text}" for text in found]
-        self.status = f"{len(placed)} markers, {namespaces} namespaces"
+                faults_of_marker = (str(error),)
+            faults += [
+                f"marker {marker.marker.ns}/{marker.marker.id}: {text}" for text in faults_of_marker
+            ]
+        self.status = f"{len(shown)} markers, {namespaces} namespaces"
         if faults:
             more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
             self._refused = faults[0] + more
-        return drawing.encode(), MEDIA
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        subscription, self._subscription = self._subscription, None
-        if subscription is not None:
-            subscription.close()
 
 
 def draw_marker(marker: Any, frame: Pose, meshes: Meshes, drawing: Drawing) -> tuple[str, ...]:
-    """Draw a marker, and return why files are not shown that its mesh refers to.
-
-    Args:
-        marker: The marker.
-        frame: Pose of its frame in the fixed frame.
-        meshes: The meshes that markers name.
-        drawing: The drawing.
+    """Draw a marker at its frame, and return why files are not shown that its mesh refers to.
 
     Raises:
         RoszError: Its mesh cannot be shown.
@@ -221,7 +171,7 @@ def _color(color: Any) -> Array:
 def _colors(marker: Any) -> Array:
     """Return the color of each point, or the one of all."""
     if marker.colors and len(marker.colors) == len(marker.points):
-        return np.array([_color(one) for one in marker.colors])
+        return np.array([_color(color) for color in marker.colors])
     return _color(marker.color)
 
 
@@ -231,8 +181,7 @@ def _points(marker: Any, pose: Pose) -> Array:
 
 
 def _sized(pose: Pose, scale: Any) -> Array:
-    found: Array = matrix_of(pose) @ np.diag((scale.x, scale.y, scale.z, 1.0))
-    return found
+    return placed(pose, scale.x, scale.y, scale.z)
 
 
 def _draw_arrow(marker: Any, pose: Pose, drawing: Drawing) -> None:
@@ -281,16 +230,8 @@ def _towards(along: Array, origin: Array) -> Array:
     return matrix
 
 
-def _draw_cube(marker: Any, pose: Pose, drawing: Drawing) -> None:
-    drawing.shapes("cube", _sized(pose, marker.scale), _color(marker.color))
-
-
-def _draw_sphere(marker: Any, pose: Pose, drawing: Drawing) -> None:
-    drawing.shapes("sphere", _sized(pose, marker.scale), _color(marker.color))
-
-
-def _draw_cylinder(marker: Any, pose: Pose, drawing: Drawing) -> None:
-    drawing.shapes("cylinder", _sized(pose, marker.scale), _color(marker.color))
+def _draw_shape(shape: Shape, marker: Any, pose: Pose, drawing: Drawing) -> None:
+    drawing.shapes(shape, _sized(pose, marker.scale), _color(marker.color))
 
 
 def _draw_strip(marker: Any, pose: Pose, drawing: Drawing) -> None:
@@ -315,22 +256,11 @@ def _draw_lines(marker: Any, drawing: Drawing, ends: Array, *, doubled: bool = F
         drawing.lines(ends, paint)
 
 
-def _draw_cubes(marker: Any, pose: Pose, drawing: Drawing) -> None:
-    drawing.shapes("cube", _each(marker, pose), _colors(marker))
-
-
-def _draw_spheres(marker: Any, pose: Pose, drawing: Drawing) -> None:
-    drawing.shapes("sphere", _each(marker, pose), _colors(marker))
-
-
-def _each(marker: Any, pose: Pose) -> Array:
-    """Return the matrix of each element of a list."""
+def _draw_shapes(shape: Shape, marker: Any, pose: Pose, drawing: Drawing) -> None:
     rows = _points(marker, pose)
-    scale = marker.scale
-    turned = matrix_of(pose) @ np.diag((scale.x, scale.y, scale.z, 1.0))
-    matrices = np.repeat(turned[None], len(rows), axis=0)
+    matrices = np.repeat(_sized(pose, marker.scale)[None], len(rows), axis=0)
     matrices[:, :3, 3] = rows
-    return matrices
+    drawing.shapes(shape, matrices, _colors(marker))
 
 
 def _draw_points(marker: Any, pose: Pose, drawing: Drawing) -> None:
@@ -358,19 +288,19 @@ def _draw_triangles(marker: Any, pose: Pose, drawing: Drawing) -> None:
     rows = np.array([(p.x * scale.x, p.y * scale.y, p.z * scale.z) for p in marker.points])
     paint = _colors(marker)
     if len(marker.colors) * 3 == len(marker.points) and len(marker.colors):
-        paint = np.repeat([_color(one) for one in marker.colors], 3, axis=0)
+        paint = np.repeat([_color(color) for color in marker.colors], 3, axis=0)
     drawing.triangles(moved(rows.reshape(-1, 3), pose), paint)
 
 
 _DRAW: dict[int, Callable[[Any, Pose, Drawing], None]] = {
     Marker.ARROW: _draw_arrow,
-    Marker.CUBE: _draw_cube,
-    Marker.SPHERE: _draw_sphere,
-    Marker.CYLINDER: _draw_cylinder,
+    Marker.CUBE: partial(_draw_shape, "cube"),
+    Marker.SPHERE: partial(_draw_shape, "sphere"),
+    Marker.CYLINDER: partial(_draw_shape, "cylinder"),
     Marker.LINE_STRIP: _draw_strip,
     Marker.LINE_LIST: _draw_list,
-    Marker.CUBE_LIST: _draw_cubes,
-    Marker.SPHERE_LIST: _draw_spheres,
+    Marker.CUBE_LIST: partial(_draw_shapes, "cube"),
+    Marker.SPHERE_LIST: partial(_draw_shapes, "sphere"),
     Marker.POINTS: _draw_points,
     Marker.TEXT_VIEW_FACING: _draw_text,
     Marker.TRIANGLE_LIST: _draw_triangles,

@@ -13,20 +13,18 @@ import posixpath
 import re
 import struct
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
 import msgspec
+import numpy as np
 
 from rosz.bridges.assets import Assets
 from rosz.environment import Environment, package_index
 from rosz.errors import RoszError, UsageError
 from rosz.web.scene.drawing import Array
-from rosz.web.scene.textures import read_texture
-
-__all__ = ("Mesh", "Meshes", "Texture")
 
 _AS_THEY_ARE = {".stl": "stl", ".glb": "glb"}
 _CONVERTED = (".dae", ".gltf", ".obj")
@@ -35,6 +33,7 @@ _NO_PICTURES = (".bin", ".mtl")
 _ENDINGS = "|".join(map(re.escape, (*_AS_THEY_ARE, *_CONVERTED, *_PICTURES, *_NO_PICTURES)))
 _FILES = re.compile(f"package://.+(?:{_ENDINGS})", re.IGNORECASE)
 _GLB_HEADER = struct.Struct("<4sIII4s")
+_GLB_CHUNK = struct.Struct("<I4s")
 _MEDIA = {"stl": "model/stl", "glb": "model/gltf-binary"}
 _UNIT = re.compile(rb"<unit\b[^>]*\bmeter=[\"']([^\"']*)")
 _LIBRARY = "needs libraries: pip install 'rosz[web]'"
@@ -42,6 +41,10 @@ _LIBRARY = "needs libraries: pip install 'rosz[web]'"
 T = TypeVar("T")
 
 Publish = Callable[[Callable[[], tuple[bytes, str]]], str]
+
+
+_PICTURE_MEDIA = {"JPEG": "image/jpeg", "PNG": "image/png", "WEBP": "image/webp"}
+"""Formats that browsers can show; pictures in other formats are converted to PNG."""
 
 
 class Mesh(msgspec.Struct, frozen=True):
@@ -102,29 +105,22 @@ class Meshes:
         return self._once(uri, self._found, self._open)
 
     def texture(self, uri: str) -> Texture:
-        """Return a texture.
-
-        Args:
-            uri: ``package://PACKAGE/FILE``, or ``file://`` and the path of a file in a package.
-
-        Raises:
-            UsageError: It cannot be shown; the text says why.
-        """
+        """Return a texture; its URI and the error are as those of a mesh."""
         return self._once(uri, self._textures, self._open_texture)
 
-    def _once(self, uri: str, found: dict[str, T | str], read: Callable[[str], T]) -> T:
-        """Return what is read of a file; it, or the reason why it cannot be, is kept."""
+    def _once(self, uri: str, cache: dict[str, T | str], read: Callable[[str], T]) -> T:
+        """Return the contents of a file; they, or the reason of a failure, are kept."""
         with self._lock:
-            one = found.get(uri)
-            if one is None:
+            mesh = cache.get(uri)
+            if mesh is None:
                 try:
-                    one = read(uri)
-                except RoszError as error:
-                    one = str(error)
-                found[uri] = one
-        if isinstance(one, str):
-            raise UsageError(one)
-        return one
+                    mesh = read(uri)
+                except (RoszError, ValueError) as error:  # a URI may be malformed
+                    mesh = str(error)
+                cache[uri] = mesh
+        if isinstance(mesh, str):
+            raise UsageError(mesh)
+        return mesh
 
     def _open_texture(self, uri: str) -> Texture:
         data, media, color = read_texture(uri, _read_picture(self._assets, self._in_package(uri)))
@@ -134,13 +130,13 @@ class Meshes:
         ending = posixpath.splitext(urlsplit(uri).path)[1].lower()
         form = _AS_THEY_ARE.get(ending, "glb")
         if ending not in _AS_THEY_ARE and ending not in _CONVERTED:
-            known = ", ".join((*_AS_THEY_ARE, *_CONVERTED))
-            raise UsageError(f"'{uri}' cannot be shown; expected one of {known}")
+            formats = ", ".join((*_AS_THEY_ARE, *_CONVERTED))
+            raise UsageError(f"'{uri}' cannot be shown; expected one of {formats}")
         inside = self._in_package(uri)
         data = self._assets.read(inside)
         colored = _has_materials(ending, data)
         missing: tuple[str, ...] = ()
-        if ending in _CONVERTED or (ending == ".glb" and _refers_elsewhere(data)):
+        if ending in _CONVERTED or (ending == ".glb" and not _is_self_contained(data)):
             resolver = _Resolver(inside, self._assets, self._in_package)
             data = _converted(inside, data, ending[1:], resolver)
             missing = tuple(resolver.missing.values())
@@ -161,16 +157,7 @@ class Meshes:
 
 
 class _Resolver:
-    """Loads the files that a mesh refers to, from its folder and its package.
-
-    Args:
-        uri: URI of the mesh.
-        assets: The files of packages.
-        in_package: Function that returns a URI of a package for one of a file.
-
-    Attributes:
-        missing: Why files cannot be read, by their names.
-    """
+    """Loads the files that a mesh refers to, and keeps why it cannot, by their names."""
 
     def __init__(self, uri: str, assets: Assets, in_package: Callable[[str], str]) -> None:
         self._folder = uri.rpartition("/")[0]
@@ -196,20 +183,42 @@ class _Resolver:
             self.missing[name] = f"without '{name}': {error}"
             raise FileNotFoundError(str(error)) from error
 
-    def __getitem__(self, name: str) -> bytes:
-        return self.get(name)
+    __getitem__ = get
 
 
 def _read_picture(assets: Assets, uri: str) -> bytes:
-    """Return a picture of a package.
-
-    Raises:
-        UsageError: It has another ending than pictures have, or it cannot be read.
-        RoszError: The package or the file is not found, or the path leads out of the package.
-    """
+    """Return the contents of a picture of a package."""
     if not uri.lower().endswith(_PICTURES):
         raise UsageError(f"'{uri}' cannot be shown; expected one of {', '.join(_PICTURES)}")
     return assets.read(uri)
+
+
+def read_texture(uri: str, data: bytes) -> tuple[bytes, str, Array]:
+    """Return a picture for browsers, its media type, and the color of its first pixel.
+
+    Args:
+        uri: Where it is from.
+        data: The contents of the file.
+
+    Raises:
+        UsageError: It is not a picture that can be read, or a library is not installed.
+    """
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise UsageError(f"'{uri}' needs a library: pip install 'rosz[web]'") from error
+    try:
+        with Image.open(io.BytesIO(data)) as picture:
+            form = picture.format or ""
+            whole = picture.convert("RGBA")
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise UsageError(f"'{uri}' is not a picture that can be read: {error}") from error
+    color = np.array(whole.getpixel((0, 0)), dtype=np.uint8)
+    if form not in _PICTURE_MEDIA:
+        buffer = io.BytesIO()
+        whole.save(buffer, "PNG")
+        form, data = "PNG", buffer.getvalue()
+    return data, _PICTURE_MEDIA[form], color
 
 
 def _has_materials(ending: str, data: bytes) -> bool:
@@ -218,25 +227,43 @@ def _has_materials(ending: str, data: bytes) -> bool:
     return bool(sign) and sign in data
 
 
-def _refers_elsewhere(glb: bytes) -> bool:
-    """Return whether a GLB refers to other files."""
+def _is_self_contained(glb: bytes) -> bool:
+    """Return whether a GLB refers to no other files, however a browser reads it.
+
+    three.js takes what does not begin as a GLB for the text of a glTF, and the last of several
+    chunks of JSON for the only one. It fetches each ``uri`` that is not data.
+    """
     try:
-        *_, length, kind = _GLB_HEADER.unpack_from(glb)
-        tree = json.loads(glb[_GLB_HEADER.size : _GLB_HEADER.size + length])
-    except (struct.error, ValueError):
+        magic, version, size, length, kind = _GLB_HEADER.unpack_from(glb)
+        start = _GLB_HEADER.size + length
+        tree = json.loads(glb[_GLB_HEADER.size : start])
+        while start < size:
+            extent, other = _GLB_CHUNK.unpack_from(glb, start)
+            start += _GLB_CHUNK.size + extent
+            if other == b"JSON":
+                return False
+    except (struct.error, ValueError, RecursionError):
         return False
-    if kind != b"JSON" or not isinstance(tree, dict):
+    if (magic, version, kind, size) != (b"glTF", 2, b"JSON", len(glb)):
         return False
-    parts = [*tree.get("images", ()), *tree.get("buffers", ())]
-    return any(not one.get("uri", "data:").startswith("data:") for one in parts)
+    return all(uri.startswith("data:") and "," in uri for uri in _uris(tree))
+
+
+def _uris(tree: Any) -> Iterator[str]:
+    """Yield everything in a glTF that is called a URI."""
+    waiting = [tree]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict):
+            if "uri" in value:
+                yield str(value["uri"])
+            waiting.extend(value.values())
+        elif isinstance(value, list):
+            waiting.extend(value)
 
 
 def _converted(uri: str, data: bytes, kind: str, resolver: Any) -> bytes:
-    """Return a mesh as GLB.
-
-    Raises:
-        UsageError: It is not well-formed, or a library is not installed.
-    """
+    """Return a mesh as GLB."""
     try:
         import collada  # noqa: F401  # trimesh needs it for DAE, and says so late
         import PIL  # noqa: F401  # trimesh goes on without textures where it is missing
@@ -245,20 +272,10 @@ def _converted(uri: str, data: bytes, kind: str, resolver: Any) -> bytes:
         raise UsageError(f"'{uri}' {_LIBRARY}") from error
     try:
         scene: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=resolver)
-        factor = _metres(data) if kind == "dae" else 1.0
-        if factor != 1.0:
-            scene.apply_scale(factor)
+        unit = _UNIT.search(data) if kind == "dae" else None
+        if unit is not None and float(unit[1]) != 1.0:
+            scene.apply_scale(float(unit[1]))
         exported = scene.export(file_type="glb")
     except Exception as error:  # its parsers raise whatever bytes lead them to
         raise UsageError(f"'{uri}' is not a mesh that can be read: {error}") from error
     return bytes(exported)
-
-
-def _metres(collada: bytes) -> float:
-    """Return the metres of the unit of a Collada file.
-
-    Raises:
-        ValueError: It is not a number.
-    """
-    unit = _UNIT.search(collada)
-    return 1.0 if unit is None else float(unit[1])

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from rosz.errors import NotFoundError, UsageError
-from rosz.introspect.subscribe import topic_types
-from rosz.introspect.topics import list_topics
+from rosz.introspect import Survey, list_topics, topic_types
 from rosz.names import short_type
 from rosz.web.model import IMAGE_TYPES, Frames, System
 from rosz.web.scene.depth import DepthDisplay, info_of
@@ -25,21 +22,16 @@ from rosz.web.scene.robot import RobotDisplay
 from rosz.web.scene.setup import AXES, DEPTH, DESCRIPTION, GRID, ROBOT, TF, Look
 from rosz.web.scene.still import STILL, StillDisplay
 
-if TYPE_CHECKING:
-    from rosz.introspect.survey import Survey
-
-__all__ = ("list_displays", "open_display")
-
 _TYPES = DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES | {HANDLE_TYPE, MAP_TYPE}
 
 
 def list_displays(survey: Survey) -> dict[str, str]:
-    """Return the names of all displays that there can be, with what they show."""
-    found = {GRID: "grid", AXES: "of a frame", TF: "frames", ROBOT: DESCRIPTION}
+    """Return the names of all possible displays, with their kinds."""
+    displays = {GRID: "grid", AXES: "of a frame", TF: "frames", ROBOT: DESCRIPTION}
     topics = {
-        one.name: short_type(kind)
-        for one in list_topics(survey.view.tokens)
-        for kind in one.types
+        entry.name: short_type(kind)
+        for entry in list_topics(survey.view.tokens)
+        for kind in entry.types
         if short_type(kind) in _TYPES
     }
     depths = {
@@ -47,7 +39,7 @@ def list_displays(survey: Survey) -> dict[str, str]:
         for name, kind in topics.items()
         if kind == "sensor_msgs/Image" and DEPTH in name and info_of(name) in topics
     }
-    return found | dict(sorted(topics.items())) | dict(sorted(depths.items()))
+    return displays | dict(sorted(topics.items())) | dict(sorted(depths.items()))
 
 
 def open_display(
@@ -75,8 +67,8 @@ def open_display(
         return RobotDisplay(node, look, frames, meshes)
     if name.partition(":")[0] == DEPTH:
         topic = name.partition(":")[2]
-        for one in filter(None, (topic, info_of(topic), look.image)):
-            system.permission.check("subscribe", one)
+        for topic_name in filter(None, (topic, info_of(topic), look.image)):
+            system.permission.check("subscribe", topic_name)
         return DepthDisplay(node, survey, look, frames)
     return _open_topic(system, survey, frames, meshes, look)
 
@@ -84,14 +76,9 @@ def open_display(
 def _open_topic(
     system: System, survey: Survey, frames: Frames, meshes: Meshes, look: Look
 ) -> Display:
-    """Open the display of a topic.
-
-    Raises:
-        RoszError: It cannot be opened, or not yet.
-    """
     name, node = look.name, system.node
     system.permission.check("subscribe", name)
-    types = [short_type(one) for one in topic_types(survey.view).get(name, ())]
+    types = [short_type(type_name) for type_name in topic_types(survey.view).get(name, ())]
     if not types:
         raise NotFoundError(f"topic '{name}' does not exist yet")
     if types[0] in MARKER_TYPES:

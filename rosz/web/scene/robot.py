@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import math
-import threading
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from rosz.errors import RoszError, TransformError, UsageError
+from rosz.node import Node
 from rosz.transforms import Pose, compose, from_rpy
 from rosz.web.model import Frames
-from rosz.web.scene.colors import color_bytes
-from rosz.web.scene.drawing import MEDIA, Array, Drawing, placed
+from rosz.web.scene.display import Display
+from rosz.web.scene.drawing import Array, Drawing, color_bytes, placed
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.setup import DESCRIPTION, ROBOT, Look
-
-if TYPE_CHECKING:
-    from rosz.node import Node
-
-__all__ = ("RobotDisplay", "Visual", "draw_visual", "read_visuals")
 
 _GRAY, _WHITE = color_bytes("#c4c9d4"), color_bytes("#ffffff")
 _SOME = 3
 
 
 class Visual(NamedTuple):
-    """A part of what a link looks like.
+    """A part of the appearance of a link.
 
     Attributes:
         link: Name of the link.
@@ -47,7 +42,7 @@ class Visual(NamedTuple):
 
 
 def read_visuals(description: str) -> list[Visual]:
-    """Return what the links of a URDF look like.
+    """Return the appearance of the links of a URDF.
 
     Raises:
         UsageError: It is not XML or not a URDF, or a number in it is not one.
@@ -58,18 +53,20 @@ def read_visuals(description: str) -> list[Visual]:
         raise UsageError(f"the description of the robot is not XML: {error}") from error
     if robot.tag != "robot":
         raise UsageError(f"the description of the robot has <{robot.tag}>; expected <robot> (URDF)")
-    materials = {one.get("name", ""): one for one in robot.iter("material") if len(one)}
-    found: list[Visual] = []
+    materials = {
+        material.get("name", ""): material for material in robot.iter("material") if len(material)
+    }
+    visuals: list[Visual] = []
     for link in robot.findall("link"):
         name = link.get("name", "")
         for visual in link.findall("visual"):
             try:
-                one = _read_visual(name, visual, materials)
+                shape = _read_visual(name, visual, materials)
             except ValueError as error:
                 raise UsageError(f"link '{name}': {error}; expected numbers") from error
-            if one is not None:
-                found.append(one)
-    return found
+            if shape is not None:
+                visuals.append(shape)
+    return visuals
 
 
 def _read_visual(link: str, visual: ET.Element, materials: dict[str, ET.Element]) -> Visual | None:
@@ -120,10 +117,10 @@ def _find_in(
     """Return a part of a material, or of the one of the robot that it names."""
     if material is None:
         return None
-    found = material.find(tag)
-    if found is None and not len(material):
-        found = materials.get(material.get("name", ""), material).find(tag)
-    return found
+    element = material.find(tag)
+    if element is None and not len(material):
+        element = materials.get(material.get("name", ""), material).find(tag)
+    return element
 
 
 def _color_of(material: ET.Element | None, materials: dict[str, ET.Element]) -> Array | None:
@@ -133,18 +130,12 @@ def _color_of(material: ET.Element | None, materials: dict[str, ET.Element]) -> 
     values = np.array([float(value) for value in color.get("rgba", "").split()])
     if len(values) != 4:  # noqa: PLR2004  # red, green, blue, opacity
         raise ValueError(f"the color '{color.get('rgba')}' has {len(values)} numbers")
-    found: Array = (np.clip(values, 0, 1) * 255).round().astype(np.uint8)
-    return found
+    rgba: Array = (np.clip(values, 0, 1) * 255).round().astype(np.uint8)
+    return rgba
 
 
 def draw_visual(visual: Visual, link: Pose, meshes: Meshes, drawing: Drawing) -> list[str]:
-    """Draw a part of a link, and return why files are not shown that it refers to.
-
-    Args:
-        visual: The part.
-        link: Pose of the link in the fixed frame.
-        meshes: The meshes.
-        drawing: The drawing.
+    """Draw a part of a link at a pose, and return why files are not shown that it refers to.
 
     Raises:
         UsageError: The mesh cannot be shown.
@@ -172,7 +163,7 @@ def draw_visual(visual: Visual, link: Pose, meshes: Meshes, drawing: Drawing) ->
     return [*faults, *mesh.missing]
 
 
-class RobotDisplay:
+class RobotDisplay(Display):
     """A robot whose description is a parameter.
 
     Args:
@@ -182,24 +173,17 @@ class RobotDisplay:
         meshes: The meshes.
     """
 
-    kind = "Robot"
-
     def __init__(self, node: Node, look: Look, frames: Frames, meshes: Meshes) -> None:
-        self.look = look
-        self.status = ""
-        self.fault = ""
+        super().__init__(look, "Robot")
         self._name = look.name.removeprefix(ROBOT).removeprefix(":") or DESCRIPTION
         self._node = node
         self._frames = frames
         self._meshes = meshes
-        self._lock = threading.Lock()
         self._text: Any = None
         self._visuals: list[Visual] = []
         self._unusable = ""
         self._fixed = ""
-        self._version = 0
-        self._shown: tuple[Any, ...] = ()
-        self._watch = node.params.watch(self._name, lambda _: self._read())
+        self._subscriptions = (node.params.watch(self._name, lambda _: self._read()),)
         self._read()
 
     def _read(self) -> None:
@@ -223,21 +207,18 @@ class RobotDisplay:
         self._fixed = fixed
         return self._shown != (self.look, fixed, self._version, self._frames.version)
 
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the drawing of the robot."""
+    def _draw_all(self, drawing: Drawing) -> None:
         with self._lock:
             look, fixed, visuals = self.look, self._fixed, self._visuals
             self._shown = look, fixed, self._version, self._frames.version
             unusable = self._unusable
-        drawing = Drawing()
         if look.visible:
             faults = self._draw(visuals, fixed, drawing)
-            self.status = "" if unusable else f"{len({one.link for one in visuals})} links"
+            self.status = "" if unusable else f"{len({visual.link for visual in visuals})} links"
             self.fault = unusable or "; ".join(faults)
-        return drawing.encode(), MEDIA
 
     def _draw(self, visuals: list[Visual], fixed: str, drawing: Drawing) -> list[str]:
-        """Draw all links, and return what cannot be drawn."""
+        """Draw all links, and return the reasons for those that cannot be drawn."""
         lost: dict[str, str] = {}
         faults: dict[str, None] = {}
         before = f"{self.look.prefix}/" if self.look.prefix else ""
@@ -248,17 +229,13 @@ class RobotDisplay:
                 lost.setdefault(visual.link, str(error).strip())
                 continue
             try:
-                found = draw_visual(visual, pose, self._meshes, drawing)
+                problems = draw_visual(visual, pose, self._meshes, drawing)
             except RoszError as error:
-                found = [str(error)]
-            faults |= dict.fromkeys(f"link '{visual.link}': {one}" for one in found)
+                problems = [str(error)]
+            faults |= dict.fromkeys(f"link '{visual.link}': {problem}" for problem in problems)
         listed = list(faults)
         if lost:
             links = ", ".join(list(lost)[:_SOME]) + " …" * (len(lost) > _SOME)
             why = next(iter(lost.values()))
             listed.insert(0, f"no transform to '{fixed}' of {len(lost)} links ({links}): {why}")
         return listed
-
-    def close(self) -> None:
-        """Watch the parameter no longer."""
-        self._watch.close()

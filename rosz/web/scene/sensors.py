@@ -9,19 +9,18 @@ import numpy as np
 
 from rosz.errors import UsageError
 from rosz.transforms import FIELD_FORMATS, Pose
-from rosz.web.scene.colors import BY_HEIGHT, BY_INTENSITY, OWN, color_bytes, rainbow
-from rosz.web.scene.drawing import Array, Drawing, moved, placed
-from rosz.web.scene.setup import Look
-
-__all__ = (
-    "MOST_POINTS",
-    "draw_camera",
-    "draw_cloud",
-    "draw_old_cloud",
-    "draw_points",
-    "draw_range",
-    "draw_scan",
+from rosz.web.scene.drawing import (
+    BY_HEIGHT,
+    BY_INTENSITY,
+    OWN,
+    Array,
+    Drawing,
+    color_bytes,
+    moved,
+    placed,
+    rainbow,
 )
+from rosz.web.scene.setup import Look
 
 MOST_POINTS = 500_000
 """Points of a cloud that are drawn; of more, every second one, or every third."""
@@ -32,12 +31,12 @@ _FAR = 1.0
 def draw_scan(scan: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     """Draw a LaserScan."""
     ranges = np.asarray(scan.ranges, dtype=np.float64)
-    known = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
-    angles = scan.angle_min + np.arange(len(ranges)) * scan.angle_increment
-    x, y = ranges * np.cos(angles), ranges * np.sin(angles)
-    points = moved(np.column_stack((x, y, np.zeros_like(x)))[known], pose)
+    valid = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
+    angles = scan.angle_min + np.flatnonzero(valid) * scan.angle_increment
+    x, y = ranges[valid] * np.cos(angles), ranges[valid] * np.sin(angles)
+    points = moved(np.column_stack((x, y, np.zeros_like(x))), pose)
     intensities = np.asarray(scan.intensities, dtype=np.float64)
-    values = intensities[known] if len(intensities) == len(ranges) else None
+    values = intensities[valid] if len(intensities) == len(ranges) else None
     draw_points(points, values, None, look, drawing)
     return f"{len(points)} of {len(ranges)} points"
 
@@ -55,8 +54,8 @@ def draw_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     step = -(-len(rows) // MOST_POINTS) or 1
     rows = rows[::step]
     points = np.column_stack([rows[name] for name in "xyz"]).astype(np.float32)
-    known = np.isfinite(points).all(axis=1)
-    points, rows = moved(points[known], pose), rows[known]
+    finite = np.isfinite(points).all(axis=1)
+    points, rows = moved(points[finite], pose), rows[finite]
     values = rows["intensity"].astype(np.float64) if "intensity" in fields else None
     own = next((rows[name] for name in ("rgb", "rgba") if name in fields), None)
     draw_points(points, values, None if own is None else _unpacked(own), look, drawing)
@@ -67,13 +66,13 @@ def draw_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
 def _rows(cloud: Any) -> Array:
     """Return the points of a cloud as an array of its fields."""
     order = ">" if cloud.is_bigendian else "<"
-    fields = [one for one in cloud.fields if one.datatype in FIELD_FORMATS]
+    fields = [field for field in cloud.fields if field.datatype in FIELD_FORMATS]
     try:
         kind = np.dtype(
             {
-                "names": [one.name for one in fields],
-                "formats": [order + FIELD_FORMATS[one.datatype] for one in fields],
-                "offsets": [one.offset for one in fields],
+                "names": [field.name for field in fields],
+                "formats": [order + FIELD_FORMATS[field.datatype] for field in fields],
+                "offsets": [field.offset for field in fields],
                 "itemsize": cloud.point_step,
             }
         )
@@ -107,25 +106,20 @@ def _unpacked(values: Array) -> Array:
 def draw_old_cloud(cloud: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     """Draw a PointCloud."""
     points = np.array([(p.x, p.y, p.z) for p in cloud.points[:MOST_POINTS]]).reshape(-1, 3)
-    channels = {one.name: one.values for one in cloud.channels}
+    channels = {channel.name: channel.values for channel in cloud.channels}
     values = channels.get("intensity", channels.get("intensities"))
     listed = None if values is None else np.asarray(values, dtype=np.float64)[: len(points)]
-    draw_points(moved(points, pose), listed, None, look, drawing)
-    return f"{len(points)} points"
+    finite = np.isfinite(points).all(axis=1)
+    if listed is not None and len(listed) == len(points):
+        listed = listed[finite]
+    draw_points(moved(points[finite], pose), listed, None, look, drawing)
+    return f"{finite.sum()} points"
 
 
 def draw_points(
     points: Array, values: Array | None, own: Array | None, look: Look, drawing: Drawing
 ) -> None:
-    """Draw points by the color of a display.
-
-    Args:
-        points: A row of three coordinates for each.
-        values: Their intensities; None without any.
-        own: Their own colors; None without any.
-        look: Settings of the display.
-        drawing: The drawing.
-    """
+    """Draw points by the color of a display: of their intensities, their own, or one for all."""
     by = look.color or (OWN if own is not None else BY_INTENSITY)
     if by == OWN and own is not None:
         colors = own
@@ -138,24 +132,24 @@ def draw_points(
     drawing.points(points, colors, look.size or _PIXELS, pixels=True)
 
 
-def draw_range(found: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
+def draw_range(measured: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
     """Draw a Range as a cone from the sensor."""
     color = color_bytes(look.color)
     color[3] = 128
-    if not (math.isfinite(found.range) and found.range > 0):
-        return f"range {found.range:g}"
-    width = 2 * found.range * math.tan(found.field_of_view / 2)
+    if not (math.isfinite(measured.range) and measured.range > 0):
+        return f"range {measured.range:g}"
+    width = 2 * measured.range * math.tan(measured.field_of_view / 2)
     # A cone along z with its tip at the end, turned so that the tip is at the sensor.
     half = math.sqrt(0.5)
     inner = placed(
-        Pose((found.range / 2, 0.0, 0.0), (0.0, -half, 0.0, half)), width, width, found.range
+        Pose((measured.range / 2, 0.0, 0.0), (0.0, -half, 0.0, half)), width, width, measured.range
     )
     drawing.shapes("cone", placed(pose) @ inner, color)
-    return f"{found.range:.3g} m"
+    return f"{measured.range:.3g} m"
 
 
 def draw_camera(info: Any, pose: Pose, look: Look, drawing: Drawing) -> str:
-    """Draw what a camera sees as a pyramid, by its CameraInfo; the size is its height.
+    """Draw the field of view of a camera as a pyramid, by its CameraInfo; the size is its height.
 
     Raises:
         UsageError: The camera is not calibrated.

@@ -12,20 +12,6 @@ from urllib.parse import urlencode
 
 import msgspec
 
-__all__ = (
-    "AXES",
-    "DEFAULT",
-    "DEPTH",
-    "DESCRIPTION",
-    "GRID",
-    "ROBOT",
-    "TF",
-    "Look",
-    "Setup",
-    "format_setup",
-    "read_setup",
-)
-
 AXES, DEPTH, GRID, TF, ROBOT = "axes", "depth", "grid", "tf", "robot"
 DESCRIPTION = "/robot_description"
 """The parameter of the robot that has no other name."""
@@ -33,6 +19,8 @@ _BETWEEN, _WITHIN = ",", ";"
 _MOST_SIZE = 1000.0
 _MOST_KEPT = 100_000
 _MOST_GRID_CELLS = 1000
+MOST_DISPLAYS = 100
+"""Largest number of displays of a page: each costs the browser and the server time."""
 
 
 class Look(msgspec.Struct, frozen=True):
@@ -45,7 +33,7 @@ class Look(msgspec.Struct, frozen=True):
         size: Size in the unit of the display; 0 for the default.
         visible: Whether it is drawn.
         keep: Number of poses of an odometry that stay drawn; 0 for the default.
-        prefix: What is before the names of the frames of a robot (``tf_prefix``).
+        prefix: The prefix of the names of a robot's frames (``tf_prefix``).
         frame: Frame that a grid or axes are at; empty for the fixed frame.
         radius: Radius of axes in metres; 0 for the default.
         cells: Number of cells of a grid along one side; 0 for the default.
@@ -64,7 +52,7 @@ class Look(msgspec.Struct, frozen=True):
     image: str = ""
 
 
-class Setup(msgspec.Struct, frozen=True):
+class SceneSetup(msgspec.Struct, frozen=True):
     """The settings of the view.
 
     Attributes:
@@ -81,26 +69,29 @@ class Setup(msgspec.Struct, frozen=True):
 DEFAULT = (Look(GRID), Look(TF))
 
 
-def read_setup(frame: str, show: str, view: str) -> Setup:
-    """Return the setup of an address; what is not valid in it has its default."""
-    looks = tuple(_read_look(one) for one in show.split(_BETWEEN) if one.strip())
-    return Setup(frame, looks or DEFAULT, view if view == "top" else "orbit")
+def read_setup(frame: str, show: str, view: str) -> SceneSetup:
+    """Return the setup of an address; invalid parts have their defaults.
+
+    There may be more displays than a page shows: `MOST_DISPLAYS`.
+    """
+    looks = tuple(_read_look(look) for look in show.split(_BETWEEN) if look.strip())
+    return SceneSetup(frame, looks or DEFAULT, view if view == "top" else "orbit")
 
 
 def _read_look(text: str) -> Look:
     name, *settings = text.strip().split(_WITHIN)
-    found = dict(one.partition("=")[::2] for one in settings)
+    options = dict(setting.partition("=")[::2] for setting in settings)
     return Look(
         name,
-        found.get("color", ""),
-        _read_length(found.get("size", "")),
-        "hidden" not in found,
-        keep=_read_count(found.get("keep", ""), _MOST_KEPT),
-        prefix=found.get("prefix", "").strip("/"),
-        frame=found.get("frame", "").removeprefix("/"),
-        radius=_read_length(found.get("radius", "")),
-        cells=_read_count(found.get("cells", ""), _MOST_GRID_CELLS),
-        image=found.get("image", ""),
+        options.get("color", ""),
+        _read_length(options.get("size", "")),
+        "hidden" not in options,
+        keep=_read_count(options.get("keep", ""), _MOST_KEPT),
+        prefix=options.get("prefix", "").strip("/"),
+        frame=options.get("frame", "").removeprefix("/"),
+        radius=_read_length(options.get("radius", "")),
+        cells=_read_count(options.get("cells", ""), _MOST_GRID_CELLS),
+        image=options.get("image", ""),
     )
 
 
@@ -116,7 +107,7 @@ def _read_count(text: str, most: int) -> int:
     return min(int(text), most) if text.isdecimal() else 0
 
 
-def format_setup(setup: Setup) -> str:
+def format_setup(setup: SceneSetup) -> str:
     """Return the address of a setup."""
     query = {"frame": setup.frame, "show": _BETWEEN.join(map(_format_look, setup.looks))}
     if setup.view != "orbit":

@@ -7,10 +7,7 @@ import math
 import numpy as np
 
 from rosz.transforms import Pose
-from rosz.web.scene.colors import color_bytes
-from rosz.web.scene.drawing import Array, Drawing, matrix_of, placed
-
-__all__ = ("draw_arrows", "draw_axes", "draw_bars", "draw_line")
+from rosz.web.scene.drawing import Array, Drawing, color_bytes, matrix_of, placed
 
 _HALF = math.sqrt(0.5)
 _ALONG_X = (0.0, _HALF, 0.0, _HALF)
@@ -88,8 +85,12 @@ def draw_bars(drawing: Drawing, ends: Array, colors: Array, width: float) -> Non
     pairs = np.asarray(ends, dtype=np.float64).reshape(-1, 2, 3)
     along = pairs[:, 1] - pairs[:, 0]
     lengths = np.linalg.norm(along, axis=1)
-    known = lengths > 0
-    pairs, along, lengths = pairs[known], along[known] / lengths[known, None], lengths[known]
+    positive = lengths > 0
+    pairs, along, lengths = (
+        pairs[positive],
+        along[positive] / lengths[positive, None],
+        lengths[positive],
+    )
     aside = np.where(np.abs(along[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # noqa: PLR2004
     second = np.cross(aside, along)
     second /= np.linalg.norm(second, axis=1)[:, None]
@@ -99,5 +100,5 @@ def draw_bars(drawing: Drawing, ends: Array, colors: Array, width: float) -> Non
     matrices[:, :3, 2] = np.cross(along, second) * width
     matrices[:, :3, 3] = pairs.mean(axis=1)
     matrices[:, 3, 3] = 1.0
-    paint = np.broadcast_to(colors, (len(known), 4))[known]
+    paint = np.broadcast_to(colors, (len(positive), 4))[positive]
     drawing.shapes("cube", matrices, paint)

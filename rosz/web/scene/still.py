@@ -7,19 +7,17 @@ import numpy as np
 from rosz.errors import TransformError
 from rosz.transforms import IDENTITY, Pose
 from rosz.web.model import Frames
-from rosz.web.scene.colors import color_bytes
-from rosz.web.scene.drawing import MEDIA, Drawing, moved
+from rosz.web.scene.display import Display
+from rosz.web.scene.drawing import Drawing, color_bytes, moved
 from rosz.web.scene.setup import AXES, GRID, Look
 from rosz.web.scene.shapes import draw_axes
-
-__all__ = ("STILL", "StillDisplay", "draw_grid", "draw_one_axes")
 
 _GRID_CELLS = 10
 _LENGTH, _RADIUS = 1.0, 0.1
 """Length and radius of axes in metres, as in rviz."""
 
 
-class StillDisplay:
+class StillDisplay(Display):
     """A grid, or axes, at a frame.
 
     Args:
@@ -28,13 +26,10 @@ class StillDisplay:
     """
 
     def __init__(self, look: Look, frames: Frames) -> None:
-        self.look = look
-        self.kind, self._draw = STILL[look.name]
-        self.status = ""
-        self.fault = ""
+        kind, self._draw = STILL[look.name]
+        super().__init__(look, kind)
         self._frames = frames
         self._place: Pose | None = None
-        self._shown: tuple[Look, Pose | None] | None = None
 
     def refresh(self, fixed: str) -> bool:
         """Return whether the settings changed, or its frame moved."""
@@ -46,16 +41,10 @@ class StillDisplay:
             self._place, self.fault = None, self._frames.why_not(fixed, frame)
         return self._shown != (self.look, self._place)
 
-    def encoded(self) -> tuple[bytes, str]:
-        """Return the drawing."""
+    def _draw_all(self, drawing: Drawing) -> None:
         look, place = self._shown = self.look, self._place
-        drawing = Drawing()
         if look.visible and place is not None:
             self.status = self._draw(look, place, drawing)
-        return drawing.encode(), MEDIA
-
-    def close(self) -> None:
-        """Do nothing; the frames belong to the page."""
 
 
 def draw_one_axes(look: Look, pose: Pose, drawing: Drawing) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
+from rosz.access import PagePolicy
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import (
     Point,
@@ -18,24 +19,12 @@ from rosz.msgs.geometry_msgs.msg import (
     Quaternion,
 )
 from rosz.msgs.std_msgs.msg import Header
+from rosz.node import Node, Publisher
 from rosz.transforms import from_rpy
-from rosz.web.model import Permission
-
-if TYPE_CHECKING:
-    from rosz.node import Node, Publisher
-
-__all__ = ("TOOLS", "Tool", "Tools")
 
 
 class Tool(msgspec.Struct, frozen=True):
-    """A tool.
-
-    Attributes:
-        title: What it is called.
-        topic: Topic that it publishes.
-        kind: Class of its messages.
-        hint: What to do with it.
-    """
+    """A tool, with the topic that it publishes and a hint for the user."""
 
     title: str
     topic: str
@@ -66,10 +55,10 @@ class Tools:
 
     Args:
         node: The node that publishes.
-        permission: What the page may change.
+        permission: The changes that the page may make.
     """
 
-    def __init__(self, node: Node, permission: Permission) -> None:
+    def __init__(self, node: Node, permission: PagePolicy) -> None:
         self._node = node
         self._permission = permission
         self._publishers: dict[str, Publisher[Any]] = {}

@@ -28,8 +28,8 @@ from programs.sides import RealSide, RoszSide
 from ros1.programs.runners import Ros
 
 from rosz.bags import Channel
-from rosz.bags.ros1_form import to_ros1
-from rosz.bags.ros1_writer import Ros1Writer
+from rosz.bags.formats.ros1_form import to_ros1
+from rosz.bags.formats.ros1_writer import Ros1Writer
 from rosz.msgs.geometry_msgs.msg import TransformStamped, Twist
 from rosz.msgs.sensor_msgs.msg import Imu
 from rosz.msgs.tf2_msgs.msg import TFMessage

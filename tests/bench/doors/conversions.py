@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from rosz.bridges.websocket.messages import build_from_json
-from rosz.bridges.websocket.operations import Publish, read_text
-from rosz.bridges.websocket.outbox import Encodings, Message
+from rosz.bridges.rosbridge.encoded import EncodedMessage, Encodings
+from rosz.bridges.rosbridge.messages import build_from_json
+from rosz.bridges.rosbridge.operations import Publish, read_text
 from rosz.msgs.geometry_msgs.msg import PoseStamped
 from rosz.msgs.sensor_msgs.msg import LaserScan
 
@@ -104,7 +104,7 @@ def _own(seconds: float) -> Iterator[float]:
         cls, data = type(message), message.to_cdr()
 
         def out(cls: Any = cls, data: bytes = data) -> bytes:
-            return Message(Encodings(1 << 24), "/x", cls, data, 0).encode(("none", "ros1"))
+            return EncodedMessage(Encodings(1 << 24), "/x", cls, data, 0).encode(("none", "ros1"))
 
         text = out()
 

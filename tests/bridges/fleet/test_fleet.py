@@ -10,7 +10,7 @@ from itertools import count
 import pytest
 from network import TIMEOUT, Network, eventually, free_port
 
-from rosz.bridges.fleet import Fleet, FleetPlan, Shared
+from rosz.bridges.fleet import Fleet, FleetPlan, SharedNames
 from rosz.errors import TransportError
 from rosz.msgs.geometry_msgs.msg import TransformStamped
 from rosz.msgs.std_msgs.msg import Header, String
@@ -25,7 +25,7 @@ PLANS = (
     FleetPlan(prefix="/robot1", frames=True),
     FleetPlan(
         prefix="/robot2",
-        share=(Shared("/chatter"), Shared("/fast", 4.0), Shared("/tf*")),
+        share=(SharedNames("/chatter"), SharedNames("/fast", 4.0), SharedNames("/tf*")),
         common=("/news",),
     ),
 )

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from rosz.bridges.fleet import FleetPlan, Shared, read_plan, read_share
+from rosz.bridges.fleet import FleetPlan, SharedNames, read_plan, read_share
 from rosz.errors import UsageError, YamlError
 
 PLAN = """
@@ -22,7 +22,7 @@ def test_a_file_says_what_crosses() -> None:
     plan = read_plan(PLAN, "fleet.yaml")
     assert plan == FleetPlan(
         prefix="/robot1",
-        share=(Shared("/odom"), Shared("/camera/**", 2.0), Shared("/dock")),
+        share=(SharedNames("/odom"), SharedNames("/camera/**", 2.0), SharedNames("/dock")),
         take=("/cmd_vel",),
         common=("/map",),
         frames=True,
@@ -64,7 +64,10 @@ def test_errors_name_line_and_column(text: str, error: str) -> None:
 
 
 def test_share_of_the_command_line() -> None:
-    assert read_share("/odom, /camera/**@2.5Hz") == (Shared("/odom"), Shared("/camera/**", 2.5))
+    assert read_share("/odom, /camera/**@2.5Hz") == (
+        SharedNames("/odom"),
+        SharedNames("/camera/**", 2.5),
+    )
 
 
 @pytest.mark.parametrize(

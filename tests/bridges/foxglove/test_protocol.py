@@ -15,10 +15,8 @@ from network import TIMEOUT, Network, eventually
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from rosz.bridges.admission import Admission
-from rosz.bridges.foxglove import Limits, Offer
-from rosz.bridges.gate import Gate
-from rosz.bridges.opening import Entrance
+from rosz.access import AccessPolicy, ServerAccess
+from rosz.bridges.foxglove import FoxgloveLimits, Offer
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.sensor_msgs.msg import Image
 from rosz.msgs.std_msgs.msg import Header, String
@@ -113,6 +111,47 @@ def test_types_that_other_nodes_describe(bridge: Bridge, client: Client) -> None
     assert "MSG: std_msgs/Header" in channel["schema"]
     client.subscribe("/pair")
     assert client.wait_data()[2] == cls(7).to_cdr()
+
+
+@pytest.mark.parametrize(
+    "members",
+    [
+        {"topic": "/" + "x" * 66_000, "schemaName": "std_msgs/String"},
+        {
+            "topic": "/own",
+            "schemaName": f"mine/msg/N{'x' * 66_000}",
+            "schema": "int32 number\n",
+            "schemaEncoding": "ros2msg",
+        },
+    ],
+)
+def test_names_that_are_too_long(bridge: Bridge, client: Client, members: dict[str, str]) -> None:
+    """Zenoh would panic, and with it end the bridge for all."""
+    client.send("advertise", channels=[{"id": 1, "encoding": "cdr", **members}])
+    assert "the limit is 1024" in client.wait_status()
+    bridge.network.node("other").publisher("chatter", String, latch=True).publish(String("on"))
+    client.subscribe("/chatter")
+    assert client.wait_data()[2] == String("on").to_cdr()
+
+
+def test_what_one_client_may_have(network: Network) -> None:
+    node = network.node("other")
+    for number in (1, 2, 3):
+        node.publisher(f"x{number}", String)
+    limits = FoxgloveLimits(subscriptions=2, advertisements=2)
+    with bridge_on(network, limits=limits) as bridge, bridge.client() as client:
+        for number in (1, 2, 3):
+            client.subscribe(f"/x{number}", number)
+        text = "subscribe: this client has 2 subscriptions, which is the limit"
+        assert client.wait_status() == text
+        client.send("unsubscribe", subscriptionIds=[1])
+        client.subscribe("/x3", 3)
+        mine = {"encoding": "json", "schemaName": "std_msgs/String"}
+        channels = [{"id": number, "topic": f"/y{number}", **mine} for number in (1, 2, 3)]
+        client.send("advertise", channels=channels)
+        text = "advertise: this client has 2 advertisements, which is the limit"
+        assert client.wait_status() == text
+        client.sync()
 
 
 def test_clients_publish(bridge: Bridge, client: Client) -> None:
@@ -362,7 +401,7 @@ def test_messages_that_are_none(bridge: Bridge, client: Client) -> None:
 
 
 def test_a_client_that_never_reads(network: Network) -> None:
-    with bridge_on(network, limits=Limits(waiting=1 << 20)) as bridge:
+    with bridge_on(network, limits=FoxgloveLimits(waiting=1 << 20)) as bridge:
         publisher = network.node("other").publisher("image", Image, queue_size=1000)
         with bridge.client(max_queue=1) as lazy, bridge.client() as quick:
             for client in (lazy, quick):
@@ -380,7 +419,7 @@ def test_a_client_that_never_reads(network: Network) -> None:
 
 
 def test_a_client_that_never_reads_answers(network: Network) -> None:
-    limits = Limits(waiting=1 << 20)
+    limits = FoxgloveLimits(waiting=1 << 20)
     with bridge_on(network, limits=limits) as bridge, bridge.client(max_queue=1) as client:
         network.node("other").params["/text"] = "x" * 1_000_000
         eventually(lambda: bridge.node.params.has("/text"), "the parameter")
@@ -393,7 +432,7 @@ def test_a_client_that_never_reads_answers(network: Network) -> None:
 
 
 def test_too_much_at_once(network: Network) -> None:
-    with bridge_on(network, limits=Limits(clients=2, message=1000)) as bridge:
+    with bridge_on(network, limits=FoxgloveLimits(clients=2, message=1000)) as bridge:
         with bridge.client() as client:
             client.send("getParameters", parameterNames=["x" * 2000])
             with pytest.raises(ConnectionClosed, match="1009"):
@@ -419,7 +458,7 @@ def test_too_much_at_once(network: Network) -> None:
     ("options", "path", "status"),
     [
         ({}, "", 403),
-        ({}, "?token=wrong", 403),
+        ({}, "?token=wrong", 401),
         ({"origin": "http://evil.example"}, "", 403),
         ({}, "?token=secret", None),
         ({"origin": "http://evil.example"}, "?token=secret", None),
@@ -427,7 +466,7 @@ def test_too_much_at_once(network: Network) -> None:
     ],
 )
 def test_passwords(network: Network, options: Any, path: str, status: int | None) -> None:
-    with bridge_on(network, entrance=Entrance(admission=Admission("secret"))) as bridge:
+    with bridge_on(network, access=ServerAccess(policy=AccessPolicy(password="secret"))) as bridge:
         if status is None:
             with bridge.client(path, **options) as client:
                 client.sync()
@@ -444,6 +483,10 @@ def test_other_pages_and_protocols(bridge: Bridge) -> None:
     with pytest.raises(InvalidStatus) as refused, bridge.client(origin="http://robot.example"):
         pass
     assert b"--origin 'http://robot.example'" in refused.value.response.body
+    for origin in ("file://", "file://localhost"):
+        with pytest.raises(InvalidStatus) as refused, bridge.client(origin=origin):
+            pass
+        assert f"--origin '{origin}'".encode() in refused.value.response.body
     with pytest.raises(InvalidStatus, match="400"), bridge.client(subprotocols=None):
         pass
 
@@ -451,7 +494,7 @@ def test_other_pages_and_protocols(bridge: Bridge) -> None:
 def test_a_read_only_bridge(network: Network) -> None:
     network.node("other").publisher("name", String, latch=True).publish("x")
     with (
-        bridge_on(network, entrance=Entrance(gate=Gate(read_only=True))) as bridge,
+        bridge_on(network, access=ServerAccess(policy=AccessPolicy(read_only=True))) as bridge,
         bridge.client() as client,
     ):
         capabilities = client.wait_op("serverInfo")["capabilities"]
@@ -474,17 +517,20 @@ def test_rules_and_patterns(network: Network) -> None:
         node.params[f"/{name}/rate"] = 1
     rules = read_rules("foxglove: {subscribe: [/odom], call: [/odom/flip]}", "rules.yaml")
     up = {"id": 1, "topic": "/x", "encoding": "cdr", "schemaName": "std_msgs/String"}
-    for gate in (
-        Gate(rules.permit_at_bridge("foxglove")),
-        Gate(topics=("/odom",), services=("/odom/*",), params=("/odom/*",)),
-        Gate(
+    for policy in (
+        AccessPolicy(rules.permit_at_bridge("foxglove")),
+        AccessPolicy(topics=("/odom",), services=("/odom/*",), params=("/odom/*",)),
+        AccessPolicy(
             topics=(re.compile("/odom|/x"),),
             services=(re.compile("/od.*"),),
             params=(re.compile("/odom/.*"),),
             published=(re.compile("/cmd"),),
         ),
     ):
-        with bridge_on(network, entrance=Entrance(gate=gate)) as bridge, bridge.client() as client:
+        with (
+            bridge_on(network, access=ServerAccess(policy=policy)) as bridge,
+            bridge.client() as client,
+        ):
             client.channel("/odom")
             client.service("/odom/flip")
             assert set(client.channels) == {"/odom"}

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network, Program, eventually, free_port
 
-from rosz.bridges.ros1 import AttachedBridge, Choice
+from rosz.bridges.ros1 import AttachedBridge, CrossingNames
 from rosz.errors import WaitTimeout
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import SetBool
@@ -112,8 +112,8 @@ def test_names_are_chosen_and_moved(robot: Robot, node: Node) -> None:
     talkers = [robot.rospy(TALKER, f"talker_{name}", f"/{name}") for name in ("scan", "image")]
     robot.run("rosparam", "set", "/speed", "1")
     robot.run("rosparam", "set", "/secret", "1")
-    choice = Choice(topics=("/sc*",), services=("*/get_loggers",), params=("/sp*",))
-    with robot.join(choice=choice, namespace="/robot1"):
+    names = CrossingNames(topics=("/sc*",), services=("*/get_loggers",), params=("/sp*",))
+    with robot.join(names=names, namespace="/robot1"):
         assert _heard(node, "/robot1/scan").get(timeout=TIMEOUT).data.startswith("rospy ")
         view = node.context.graph.view
         assert "/robot1/talker_scan" in view().nodes()

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
 from http.client import HTTPException
+from logging import LogRecord
+from logging.handlers import QueueHandler
 from queue import SimpleQueue
 from typing import Any
 from xmlrpc.client import ServerProxy, dumps
@@ -87,6 +89,10 @@ def test_methods_answer_as_the_master_of_ros_1(world: World) -> None:
     assert world.call("lookupService", "/x", "/none") == [-1, "no provider", ""]
     assert world.call("getParam", "/x") == [-1, "Error: bad call arity", 0]
     assert world.call("getParam") == [-1, "missing required caller_id parameter", 0]
+    long, uri = "x" * 66_000, "http://localhost:1/"
+    for name, topic, kind in (("/x", long, "a/B"), ("/x", "/t", f"a/{long}"), (long, "/t", "a/B")):
+        code, text, _ = world.call("registerPublisher", name, topic, kind, uri)
+        assert (code, text.endswith("the limit is 1024")) == (-1, True)
     code, text, _ = world.call("registerPublisher", "/x", "/t", "std_msgs/String", "no uri")
     assert (code, text) == (-1, "ERROR: parameter [no uri] is not an RPC URI")
     many = [{"methodName": "getParam", "params": ["/x", "gone"]}, {"methodName": "none"}]
@@ -183,7 +189,6 @@ def test_other_types_are_refused_in_words(
     world: World,
     node: Node,
     caplog: pytest.LogCaptureFixture,
-    capfd: pytest.CaptureFixture[str],
 ) -> None:
     node.publisher("/number", Int32)
     world.rospy(LISTENER, "mistaken", "/number")
@@ -200,15 +205,13 @@ def test_other_types_are_refused_in_words(
 
     talker = world.rospy(TALKER, "other_talker", "/text")
     eventually(lambda: node.context.graph.view().publishers("/text"))
+    # Reading the captured output again and again would lose what is written in between.
+    warnings: SimpleQueue[LogRecord] = SimpleQueue()
+    node.log.addHandler(QueueHandler(warnings))
     heard = _heard(node, "/text", Int32)
-    printed: list[str] = []
     words = "node '/other_talker' publishes topic '/text' with type 'std_msgs/msg/String', but here"
-
-    def warned() -> bool:
-        printed.append(capfd.readouterr().err)
-        return words in "".join(printed)
-
-    eventually(warned)
+    while words not in warnings.get(timeout=TIMEOUT).getMessage():
+        pass
     assert heard.empty()
     talker.kill()
     eventually(lambda: not node.context.graph.view().publishers("/text"))
@@ -576,7 +579,9 @@ def test_a_connection_stands_for_a_node_that_is_there(world: World, node: Node) 
     shared = world.bridge._shared
 
     def has_taken_over() -> bool:
-        return [t.node_name for t in shared.subscriptions("/stood_for")] == ["/neighbour"]
+        return [t.node_name for t in shared.entities(Kind.SUBSCRIPTION, name="/stood_for")] == [
+            "/neighbour"
+        ]
 
     class Answering(SimpleXMLRPCServer):
         def _dispatch(self, method: str, params: Any) -> Any:
@@ -595,7 +600,7 @@ def test_a_connection_stands_for_a_node_that_is_there(world: World, node: Node) 
         world.network.thread(server.serve_forever)
         uri = f"http://127.0.0.1:{server.server_address[1]}/"
         registered = ("/spoken", "/stood_for", "std_msgs/String", uri)
-        eventually(lambda: shared.subscriptions("/stood_for"))
+        eventually(lambda: shared.entities(Kind.SUBSCRIPTION, name="/stood_for"))
         assert world.call("registerPublisher", *registered)[0] == 1
         for expected in ("/first_ear", "/neighbour"):
             sock = stack.enter_context(listener.accept()[0])

@@ -5,17 +5,19 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rosz.bridges.ros1.registry import Change, Entry, Registry, Role
+from rosz.bridges.ros1.registry import Change, Registry, RegistryEntry, Role
 
 
-def _publisher(node: str, uri: str = "", name: str = "/t", kind: str = "std_msgs/String") -> Entry:
-    return Entry("publisher", name, node, uri or f"http://{node[1:]}:1/", kind)
+def _publisher(
+    node: str, uri: str = "", name: str = "/t", kind: str = "std_msgs/String"
+) -> RegistryEntry:
+    return RegistryEntry("publisher", name, node, uri or f"http://{node[1:]}:1/", kind)
 
 
 def test_registrations_come_and_go() -> None:
     registry, entry = Registry(), _publisher("/a")
-    assert registry.register(entry).changes == [Change(entry, alive=True)]
-    assert registry.register(entry).changes == []
+    assert registry.register(entry) == [Change(entry, alive=True)]
+    assert registry.register(entry) == []
     assert registry.uri("/a") == "http://a:1/"
     assert registry.by_name("publisher") == {"/t": ["/a"]}
     assert registry.unregister("publisher", "/t", "/a", "http://older:1/") == []
@@ -27,32 +29,31 @@ def test_registrations_come_and_go() -> None:
 def test_a_newer_node_of_a_name_replaces_the_older() -> None:
     registry = Registry()
     older = [_publisher("/a", name="/t"), _publisher("/a", name="/u")]
-    registry.load(older)
+    for entry in older:
+        registry.register(entry)
     newer = _publisher("/a", "http://a:2/")
-    result = registry.register(newer)
-    assert result.replaced == "http://a:1/"
-    assert result.changes == [*(Change(e, alive=False) for e in older), Change(newer, alive=True)]
+    changes = registry.register(newer)
+    assert changes == [*(Change(e, alive=False) for e in older), Change(newer, alive=True)]
     assert registry.dump() == [newer]
 
 
 def test_a_service_has_one_provider() -> None:
     registry = Registry()
-    first = Entry("service", "/s", "/a", "http://a:1/", service_uri="rosrpc://a:9")
-    second = Entry("service", "/s", "/b", "http://b:1/", service_uri="rosrpc://b:9")
+    first = RegistryEntry("service", "/s", "/a", "http://a:1/", service_uri="rosrpc://a:9")
+    second = RegistryEntry("service", "/s", "/b", "http://b:1/", service_uri="rosrpc://b:9")
     registry.register(first)
-    result = registry.register(second)
-    assert result.changes == [Change(first, alive=False), Change(second, alive=True)]
-    assert not result.replaced
+    changes = registry.register(second)
+    assert changes == [Change(first, alive=False), Change(second, alive=True)]
     assert registry.unregister("service", "/s", "/a", "rosrpc://a:9") == []
     assert registry.unregister("service", "/s", "/b", "rosrpc://b:9")
 
 
 def test_publishers_decide_the_type() -> None:
     registry = Registry()
-    registry.register(Entry("subscriber", "/t", "/s", "http://s:1/", "*"))
+    registry.register(RegistryEntry("subscriber", "/t", "/s", "http://s:1/", "*"))
     assert registry.types() == {}
-    registry.register(Entry("subscriber", "/t", "/r", "http://r:1/", "a/B"))
-    registry.register(Entry("subscriber", "/t", "/q", "http://q:1/", "a/C"))
+    registry.register(RegistryEntry("subscriber", "/t", "/r", "http://r:1/", "a/B"))
+    registry.register(RegistryEntry("subscriber", "/t", "/q", "http://q:1/", "a/C"))
     assert registry.types() == {"/t": "a/B"}
     registry.register(_publisher("/p", kind="a/D"))
     assert registry.types() == {"/t": "a/D"}
@@ -70,11 +71,11 @@ _STEPS = st.tuples(
 
 @given(st.lists(_STEPS, max_size=40))
 def test_changes_tell_everything(steps: list[tuple[bool, Role, str, str, int]]) -> None:
-    registry, seen = Registry(), set[Entry]()
+    registry, seen = Registry(), set[RegistryEntry]()
     for add, role, name, node, uri in steps:
-        entry = Entry(role, f"/{name}", f"/{node}", f"http://{node}:{uri}/")
+        entry = RegistryEntry(role, f"/{name}", f"/{node}", f"http://{node}:{uri}/")
         if add:
-            changes = registry.register(entry).changes
+            changes = registry.register(entry)
         else:
             changes = registry.unregister(role, entry.name, entry.node, entry.uri)
         for change in changes:
@@ -83,5 +84,6 @@ def test_changes_tell_everything(steps: list[tuple[bool, Role, str, str, int]]) 
         assert seen == set(registry.dump())
         assert set(registry.nodes()) == {entry.node for entry in seen}
     again = Registry()
-    again.load(registry.dump())
+    for entry in registry.dump():
+        again.register(entry)
     assert again.dump() == registry.dump()

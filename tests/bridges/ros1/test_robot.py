@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from network import TIMEOUT, Program, eventually, repeats
 
-from rosz.actions import ActionClient, ClientGoal
+from rosz.actions import ActionlibClient, ActionlibClientGoal, GoalState, ServerGoal
 from rosz.errors import ActionError, GoalFailed, RoszError
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.msgs.builtin_interfaces.msg import Time
@@ -20,8 +20,6 @@ from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped,
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node
-from rosz.node.action_server import ServerGoal
-from rosz.node.goals import GoalState
 from rosz.reconfigure import Client
 from rosz.transforms import (
     Buffer,
@@ -133,21 +131,21 @@ def test_goals_of_roscpp_clients(world: World, robot: Start) -> None:
     waiting.wait_for("server lost")
 
 
-def _client(node: Node) -> ActionClient:
+def _client(node: Node) -> ActionlibClient:
     """Return a client that sees the server."""
-    client = ActionClient(node, "count", node.context.types.message("actionlib/TestAction"))
+    client = ActionlibClient(node, "count", node.context.types.message("actionlib/TestAction"))
     assert client.wait_for_server(TIMEOUT)
     return client
 
 
-def _send(client: ActionClient, goal: int) -> tuple[ClientGoal, threading.Event]:
+def _send(client: ActionlibClient, goal: int) -> tuple[ActionlibClientGoal, threading.Event]:
     """Send a goal; return it with an event that its feedback sets."""
     begun = threading.Event()
     message = client.node.context.types.message("actionlib/TestGoal")(goal)
     return client.send(message, on_feedback=lambda _: begun.set()), begun
 
 
-def _ended(goal: ClientGoal) -> tuple[int, str]:
+def _ended(goal: ActionlibClientGoal) -> tuple[int, str]:
     assert goal.wait(TIMEOUT)
     return goal.status.status, goal.status.text
 

@@ -10,8 +10,8 @@ from typing import Any
 from network import TIMEOUT, Network, eventually
 from websockets.sync.client import ClientConnection, connect
 
-from rosz.actions import ActionServer, SimpleActionServer
-from rosz.bridges.websocket import WebsocketBridge
+from rosz.actions import ActionlibServer, SimpleActionServer
+from rosz.bridges.rosbridge import WebsocketBridge
 from rosz.msgs.actionlib.action import Test
 from rosz.node import Node
 
@@ -87,7 +87,7 @@ class Doubling:
     def __init__(self, node: Node) -> None:
         node.action_server("native", Test, self._execute_native)
         action = node.context.types.message("actionlib/TestAction")
-        self._classic = SimpleActionServer(ActionServer(node, "classic", action), self._execute)
+        self._classic = SimpleActionServer(ActionlibServer(node, "classic", action), self._execute)
         self._classic.start()
 
     def _execute_native(self, goal: Any) -> None:

@@ -15,13 +15,14 @@ import pytest
 from network import TIMEOUT, Network, eventually
 from websockets.exceptions import ConnectionClosed
 
-from rosz.bridges.admission import Admission
-from rosz.bridges.opening import Entrance
-from rosz.bridges.websocket import Limits
-from rosz.bridges.websocket.operations import Fragment, Fragments
-from rosz.bridges.websocket.outbox import Encodings, Feed, Message, Outbox
+from rosz.access import AccessPolicy, ServerAccess
+from rosz.bridges.clients import OutgoingQueue
+from rosz.bridges.rosbridge import RosbridgeLimits
+from rosz.bridges.rosbridge.encoded import EncodedMessage, Encodings, SubscribedQueue
+from rosz.bridges.rosbridge.operations import Fragment, Fragments
 from rosz.errors import UsageError
 from rosz.msgs.sensor_msgs.msg import Image
+from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 
 from .bridge import Bridge, bridge_on
@@ -49,7 +50,7 @@ def response(client: socket.socket) -> bytes:
 
 @system
 def test_all_come_at_once(network: Network) -> None:
-    with bridge_on(network, limits=Limits(clients=20)) as bridge, bridge.client() as first:
+    with bridge_on(network, limits=RosbridgeLimits(clients=20)) as bridge, bridge.client() as first:
         clients = [socket.create_connection(("127.0.0.1", bridge.server.port)) for _ in range(60)]
         for client in clients:
             client.sendall(HANDSHAKE)
@@ -105,8 +106,11 @@ def test_an_enormous_frame(bridge: Bridge) -> None:
     ],
 )
 def test_clients_without_the_password(network: Network, text: Any, reason: str) -> None:
-    limits = Limits(password_seconds=0.1 if text is None else TIMEOUT)
-    options: Any = {"entrance": Entrance(admission=Admission("secret")), "limits": limits}
+    limits = RosbridgeLimits(password_seconds=0.1 if text is None else TIMEOUT)
+    options: Any = {
+        "access": ServerAccess(policy=AccessPolicy(password="secret")),
+        "limits": limits,
+    }
     with bridge_on(network, **options) as bridge, bridge.client("?token=secret") as trusted:
         with bridge.client() as client:
             if text is not None:
@@ -115,6 +119,79 @@ def test_clients_without_the_password(network: Network, text: Any, reason: str) 
                 client.receive()
         trusted.send("advertise", topic="/" + "long" * 2000, type="std_msgs/String")
         trusted.sync()
+
+
+@system
+@pytest.mark.parametrize(
+    ("op", "members"),
+    [
+        ("subscribe", {"topic": "NAME"}),
+        ("subscribe", {"topic": "/a", "type": "std_msgs/NAME"}),
+        ("advertise", {"topic": "NAME", "type": "std_msgs/String"}),
+        ("publish", {"topic": "NAME", "type": "std_msgs/String"}),
+        ("advertise_service", {"service": "NAME", "type": "std_srvs/Empty"}),
+        ("advertise_action", {"action": "NAME", "type": "actionlib/Test"}),
+        ("call_service", {"service": "NAME"}),
+        ("send_action_goal", {"action": "NAME", "action_type": "actionlib/Test", "id": "x"}),
+    ],
+)
+def test_names_that_are_too_long(bridge: Bridge, op: str, members: dict[str, str]) -> None:
+    """Zenoh would panic, and end the bridge for all."""
+    bridge.network.node("other").publisher("chatter", String, latch=True).publish(String("on"))
+    with bridge.client() as client, bridge.client() as other:
+        client.send(
+            op, **{key: text.replace("NAME", "x" * 66_000) for key, text in members.items()}
+        )
+        answer = client.receive()
+        assert answer.get("level", "error") == "error"
+        assert answer.get("result") in {None, False}
+        other.send("subscribe", topic="/chatter", type="std_msgs/String")
+        assert other.receive_op("publish")["msg"] == {"data": "on"}
+
+
+@system
+def test_what_one_client_may_have(network: Network) -> None:
+    """Others have their own: what is refused is named, and what is given up makes room."""
+    limits = RosbridgeLimits(subscriptions=2, advertisements=2, services=2)
+    with bridge_on(network, limits=limits) as bridge, bridge.client() as client:
+        for op, name, kind, word in (
+            ("subscribe", "topic", "std_msgs/String", "subscriptions"),
+            ("advertise", "topic", "std_msgs/String", "advertisements"),
+            ("advertise_service", "service", "std_srvs/Empty", "services"),
+            ("advertise_action", "action", "actionlib/Test", "services"),
+        ):
+            for number in (1, 2, 2, 3):
+                client.send(op, **{name: f"/x{number}"}, type=kind)
+            refusal = f"this client has 2 {word}, which is the limit"
+            assert client.receive()["msg"] == f"{op}: {refusal}"
+            with bridge.client() as other:
+                other.send(op, **{name: "/x3"}, type=kind)
+                other.sync()
+            undo = op.replace("sub", "unsub") if op == "subscribe" else f"un{op}"
+            client.send(undo, **{name: "/x1"})
+            client.send(op, **{name: "/x3"}, type=kind)
+            client.sync()
+
+
+@system
+def test_too_many_calls(network: Network) -> None:
+    go_on = threading.Event()
+
+    def wait(_request: Any) -> Any:
+        go_on.wait(TIMEOUT)
+        return Empty.Response()
+
+    network.node("other").service("wait", Empty, wait)
+    with bridge_on(network, limits=RosbridgeLimits(calls=3)) as bridge, bridge.client() as client:
+        bridge.wait_for_service("/wait")
+        for number in range(4):
+            client.send("call_service", service="/wait", id=number)
+        refused = client.receive_op("service_response")
+        assert (refused["id"], refused["result"]) == (3, False)
+        assert refused["values"] == "this client has 3 calls, which is the limit"
+        go_on.set()
+        assert {client.receive_op("service_response")["id"] for _ in range(3)} == {0, 1, 2}
+        client.sync()
 
 
 @system
@@ -128,7 +205,10 @@ def test_calls_that_do_not_end(network: Network) -> None:
         return Empty.Response()
 
     network.node("other").service("wait", Empty, wait)
-    with bridge_on(network, limits=Limits(operation=3000)) as bridge, bridge.client() as client:
+    with (
+        bridge_on(network, limits=RosbridgeLimits(operation=3000)) as bridge,
+        bridge.client() as client,
+    ):
         bridge.wait_for_service("/wait")
         for number in range(3):
             client.send("call_service", service="/wait", id=number)
@@ -171,19 +251,27 @@ def test_parts_are_bounded() -> None:
         assert parts.add(Fragment(id="d", data="z" * 500, num=0, total=1)) == "z" * 500
 
 
-def image(encodings: Encodings, size: int) -> Message:
+def test_parts_have_one_total() -> None:
+    parts = Fragments(1000)
+    assert parts.add(Fragment(id="a", data="x", num=5, total=6)) is None
+    with pytest.raises(UsageError, match="the parts of 'a' differ in their total"):
+        parts.add(Fragment(id="a", data="y", num=0, total=2))
+    assert parts.add(Fragment(id="a", data="z", num=0, total=1)) == "z"
+
+
+def image(encodings: Encodings, size: int) -> EncodedMessage:
     """Return a message of a size."""
-    return Message(encodings, "/image", Image, Image(data=bytes(size)).to_cdr(), 0)
+    return EncodedMessage(encodings, "/image", Image, Image(data=bytes(size)).to_cdr(), 0)
 
 
 def test_encodings_are_bounded() -> None:
     """A client that does not read keeps messages, and not what was made of them for others."""
     encodings = Encodings(500_000)
-    outbox = Outbox(10_000_000, lambda: None, lambda: None)
-    feed = Feed()
+    queue: OutgoingQueue[EncodedMessage] = OutgoingQueue(10_000_000, lambda: None, lambda: None)
+    topic = SubscribedQueue()
     messages = [image(encodings, 100_000) for _ in range(50)]
     for message in messages:
-        outbox.offer(feed, message)
+        queue.offer(topic, message)
         message.encode(("none", "ros1"))
     kept = [one for message in messages for one in message._encoded.values()]
     assert 100_000 < sum(map(len, kept)) <= 500_000
@@ -193,14 +281,16 @@ def test_encodings_are_bounded() -> None:
 
 def test_what_waits_is_bounded() -> None:
     waiting = []
-    outbox = Outbox(1_000_000, lambda: None, lambda: waiting.append("too many answers"))
-    feeds = [Feed() for _ in range(3)]
+    queue: OutgoingQueue[EncodedMessage] = OutgoingQueue(
+        1_000_000, lambda: None, lambda: waiting.append("too many answers")
+    )
+    topics = [SubscribedQueue() for _ in range(3)]
     encodings = Encodings(0)
     for number in range(300):
-        outbox.offer(feeds[number % 3], image(encodings, 50_000))
+        queue.offer(topics[number % 3], image(encodings, 50_000))
     gc.collect()
-    messages = [one for one in gc.get_objects() if isinstance(one, Message)]
+    messages = [one for one in gc.get_objects() if isinstance(one, EncodedMessage)]
     assert sum(one.size for one in messages if one._encodings is encodings) < 1_100_000
     for _ in range(300):
-        outbox.put(bytes(50_000))
+        queue.put(bytes(50_000))
     assert waiting == ["too many answers"]

@@ -11,8 +11,9 @@ import msgspec
 import pytest
 
 import rosz.msgs
-from rosz.bridges.websocket.messages import build, build_from_json
-from rosz.bridges.websocket.plain import Spelling, converter
+from rosz.bridges.clients import build
+from rosz.bridges.rosbridge.messages import build_from_json
+from rosz.bridges.rosbridge.plain import Spelling, converter
 from rosz.errors import EncodeError, UsageError
 from rosz.message import INTEGER_RANGES, Message, slots
 from rosz.msgs.builtin_interfaces.msg import Time
@@ -59,7 +60,7 @@ def test_all_types(spelling: Spelling, monkeypatch: pytest.MonkeyPatch) -> None:
         wanted = build(cls, plain, NOW).to_cdr()
         with monkeypatch.context() as patch:
             # Nothing is left to the slow way.
-            patch.setattr("rosz.bridges.websocket.messages.build", None)
+            patch.setattr("rosz.bridges.rosbridge.messages.build", None)
             text = msgspec.Raw(msgspec.json.encode(plain))
             assert build_from_json(cls, text, spelling, NOW).to_cdr() == wanted, cls
             empty = build_from_json(cls, msgspec.Raw(b"{}"), spelling, NOW)

@@ -20,10 +20,9 @@ from PIL import Image as Picture
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from rosz.bridges.admission import Admission
-from rosz.bridges.gate import Gate
-from rosz.bridges.opening import Entrance
-from rosz.bridges.websocket import Limits
+from rosz.access import AccessPolicy, ServerAccess
+from rosz.actions import ActionClient, GoalState
+from rosz.bridges.rosbridge import RosbridgeLimits
 from rosz.errors import ActionError
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import PoseStamped
@@ -31,8 +30,6 @@ from rosz.msgs.rcl_interfaces.msg import Log
 from rosz.msgs.sensor_msgs.msg import CameraInfo, Image, LaserScan
 from rosz.msgs.std_msgs.msg import Float64, Header, Int32, String
 from rosz.msgs.std_srvs.srv import SetBool
-from rosz.node.action_client import ActionClient
-from rosz.node.goals import GoalState
 from rosz.security import read_rules
 
 from .bridge import Bridge, Client, bridge_on
@@ -299,6 +296,7 @@ def test_services_of_clients(bridge: Bridge, client: Client) -> None:
     client.send("advertise_service", service="/served", type="std_srvs/SetBool")
     client.sync()
     flip = node.client("served", SetBool)
+    flip.wait_for_service(TIMEOUT)
     answers: SimpleQueue[Any] = SimpleQueue()
 
     def call() -> None:
@@ -407,7 +405,7 @@ def test_a_client_that_leaves(bridge: Bridge) -> None:
 
 
 def test_a_client_that_never_reads(network: Network) -> None:
-    with bridge_on(network, limits=Limits(waiting=1 << 20)) as bridge:
+    with bridge_on(network, limits=RosbridgeLimits(waiting=1 << 20)) as bridge:
         publisher = network.node("other").publisher("image", Image, queue_size=1000)
         subscribe = {"topic": "/image", "type": "sensor_msgs/Image"}
         with bridge.client(max_queue=1) as lazy, bridge.client() as quick:
@@ -426,7 +424,7 @@ def test_a_client_that_never_reads(network: Network) -> None:
 
 
 def test_too_much_at_once(network: Network) -> None:
-    with bridge_on(network, limits=Limits(clients=2, operation=1000)) as bridge:
+    with bridge_on(network, limits=RosbridgeLimits(clients=2, operation=1000)) as bridge:
         with bridge.client() as client:
             client.send("publish", topic="/x", msg={"data": "x" * 2000})
             with pytest.raises(ConnectionClosed, match="1009"):
@@ -445,8 +443,8 @@ def test_too_much_at_once(network: Network) -> None:
 @pytest.mark.parametrize(
     ("options", "path", "status"),
     [
-        ({}, "?token=wrong", 403),
-        ({"additional_headers": {"Authorization": "Bearer wrong"}}, "", 403),
+        ({}, "?token=wrong", 401),
+        ({"additional_headers": {"Authorization": "Bearer wrong"}}, "", 401),
         ({"origin": "http://evil.example"}, "", 403),
         ({"origin": "null"}, "", 403),
         ({}, "?token=secret", None),
@@ -456,7 +454,7 @@ def test_too_much_at_once(network: Network) -> None:
     ],
 )
 def test_passwords(network: Network, options: Any, path: str, status: int | None) -> None:
-    with bridge_on(network, entrance=Entrance(admission=Admission("secret"))) as bridge:
+    with bridge_on(network, access=ServerAccess(policy=AccessPolicy(password="secret"))) as bridge:
         if status is None:
             with bridge.client(path, **options) as client:
                 client.sync()
@@ -464,6 +462,40 @@ def test_passwords(network: Network, options: Any, path: str, status: int | None
         with pytest.raises(InvalidStatus) as refused, bridge.client(path, **options):
             pass
         assert refused.value.response.status_code == status
+
+
+def test_guessing_becomes_slow(network: Network) -> None:
+    """Each wrong password of an address makes the next pause longer, however it is sent."""
+    with bridge_on(network, access=ServerAccess(policy=AccessPolicy(password="secret"))) as bridge:
+        for status in (401, 401, 401, 401):
+            with pytest.raises(InvalidStatus, match=str(status)), bridge.client("?token=wrong"):
+                pass
+        proof = {"mac": "0" * 128, "t": int(time.time()), "end": int(time.time()) + 600}
+        with bridge.client() as client:
+            client.send("auth", **proof)
+            with pytest.raises(ConnectionClosed, match="password is missing or wrong"):
+                client.receive()
+        with bridge.client() as client:
+            client.send("auth", **proof)
+            with pytest.raises(ConnectionClosed, match="wrong too often; try again in 1 s"):
+                client.receive()
+        with pytest.raises(InvalidStatus, match="429"), bridge.client("?token=secret"):
+            pass
+
+
+@pytest.mark.parametrize(
+    ("headers", "path"),
+    [
+        ({"Origin": "http://["}, ""),
+        ([("Origin", "http://a"), ("Origin", "http://b")], ""),
+        ({}, "/["),
+    ],
+)
+def test_malformed_requests(network: Network, headers: Any, path: str) -> None:
+    with bridge_on(network, access=ServerAccess(policy=AccessPolicy(password="secret"))) as bridge:
+        url = f"ws://127.0.0.1:{bridge.server.port}"
+        with pytest.raises(InvalidStatus, match="400"):
+            connect(f"{url}/{path}", additional_headers=headers)
 
 
 def test_pages_of_this_machine(bridge: Bridge) -> None:
@@ -476,7 +508,7 @@ def test_pages_of_this_machine(bridge: Bridge) -> None:
 
 
 def test_rosauth(network: Network) -> None:
-    with bridge_on(network, entrance=Entrance(admission=Admission("secret"))) as bridge:
+    with bridge_on(network, access=ServerAccess(policy=AccessPolicy(password="secret"))) as bridge:
         now = int(time.time())
         fields = {"client": "c", "dest": "d", "rand": "r", "t": now, "level": "l", "end": now + 600}
         mac = hashlib.sha512("".join(map(str, ("secret", *fields.values()))).encode()).hexdigest()
@@ -498,38 +530,38 @@ RULES = "websocket: {subscribe: [/odom], publish: [/cmd/**], call: [/go], set: [
 
 
 @pytest.mark.parametrize(
-    ("gate", "allowed", "refused"),
+    ("policy", "allowed", "refused"),
     [
         (
-            Gate(read_only=True),
+            AccessPolicy(read_only=True),
             [("subscribe", "/cmd/a"), ("get", "/x")],
             [("publish", "/cmd/a"), ("call", "/go"), ("serve", "/x"), ("set", "/gains/a")],
         ),
         (
-            Gate(topics=("/cmd/*",), params=("/gains*",)),
+            AccessPolicy(topics=("/cmd/*",), params=("/gains*",)),
             [("publish", "/cmd/a"), ("call", "/go"), ("set", "/gains/a")],
             [("subscribe", "/odom"), ("get", "/x")],
         ),
         (
-            Gate(read_rules(RULES, "rules.yaml").permit_at_bridge("websocket")),
+            AccessPolicy(read_rules(RULES, "rules.yaml").permit_at_bridge("websocket")),
             [("subscribe", "/odom"), ("publish", "/cmd/a"), ("call", "/go"), ("set", "/gains/a")],
             [("publish", "/odom"), ("subscribe", "/x"), ("serve", "/go"), ("get", "/gains/a")],
         ),
         (
-            Gate(read_rules("robot1: all", "rules.yaml").permit_at_bridge("websocket")),
+            AccessPolicy(read_rules("robot1: all", "rules.yaml").permit_at_bridge("websocket")),
             [],
             [("subscribe", "/odom"), ("publish", "/odom"), ("get", "/x")],
         ),
     ],
 )
-def test_gates(gate: Gate, allowed: list[Any], refused: list[Any]) -> None:
-    assert [one for one in allowed if gate.objection(*one)] == []
-    assert [one for one in refused if not gate.objection(*one)] == []
+def test_policies(policy: AccessPolicy, allowed: list[Any], refused: list[Any]) -> None:
+    assert [one for one in allowed if policy.objection(*one)] == []
+    assert [one for one in refused if not policy.objection(*one)] == []
 
 
 def test_a_read_only_bridge(network: Network) -> None:
     with (
-        bridge_on(network, entrance=Entrance(gate=Gate(read_only=True))) as bridge,
+        bridge_on(network, access=ServerAccess(policy=AccessPolicy(read_only=True))) as bridge,
         bridge.client() as client,
     ):
         network.node("other").publisher("name", String, latch=True).publish("x")
@@ -604,6 +636,29 @@ def test_rosapi(bridge: Bridge, client: Client) -> None:
     assert call("has_param", name="/gains") == {"exists": False}
     assert call("get_ros_version")["version"] == 1
     assert call("action_servers") == {"action_servers": ["/tf2_web_republisher"]}
+
+
+def test_rosapi_says_nothing_of_names_that_are_not_shown(network: Network) -> None:
+    node = network.node("other")
+    node.publisher("pose", PoseStamped)
+    node.subscription("pose", PoseStamped, print)
+    node.service("flip", SetBool, lambda request: (request.data, "ok"))
+    policy = AccessPolicy(topics=("/none",), services=("/rosapi/*",))
+    with (
+        bridge_on(network, access=ServerAccess(policy=policy)) as bridge,
+        bridge.client() as client,
+    ):
+        bridge.wait_for_service("/flip")
+        for service, args, answer in (
+            ("publishers", {"topic": "/pose"}, {"publishers": []}),
+            ("subscribers", {"topic": "/pose"}, {"subscribers": []}),
+            ("service_type", {"service": "/flip"}, {"type": ""}),
+            ("service_providers", {"service": "/flip"}, {"providers": []}),
+            ("service_node", {"service": "/flip"}, {"node": ""}),
+            ("service_host", {"service": "/flip"}, {"host": ""}),
+        ):
+            client.send("call_service", service=f"/rosapi/{service}", args=args)
+            assert client.receive_op("service_response")["values"] == answer
 
 
 def test_a_bridge_that_ends(network: Network) -> None:

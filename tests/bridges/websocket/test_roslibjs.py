@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network, Program, eventually, free_port
 
-from rosz.bridges.websocket import WebsocketBridge
+from rosz.actions import GoalState
+from rosz.bridges.rosbridge import WebsocketBridge
 from rosz.msgs.actionlib.action import Test
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
@@ -21,7 +22,6 @@ from rosz.msgs.sensor_msgs.msg import LaserScan
 from rosz.msgs.std_msgs.msg import Header, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node
-from rosz.node.goals import GoalState
 from rosz.transforms import StaticTransformBroadcaster
 
 from .bridge import Doubling, bridge_on

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from network import TIMEOUT, Network
 
-from rosz.actions import ActionClient
+from rosz.actions import ActionlibClient
 from rosz.msgs.actionlib.action import Test as TestAction
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.geometry_msgs.msg import PoseStamped
@@ -202,7 +202,7 @@ def test_actionlib(bridge: Bridge, transport: str) -> None:
         for name, last in (("/native", 5), ("/classic", 5), ("/doubled", 0))
         for line in (f"{name} 26 True", f"{name} feedback True", f"{name} {last} True")
     ]
-    client = ActionClient(node, "doubled", node.context.types.message("actionlib/TestAction"))
+    client = ActionlibClient(node, "doubled", node.context.types.message("actionlib/TestAction"))
     assert client.wait_for_server(TIMEOUT)
     goal = client.send(TestAction.Goal(4))
     assert goal.wait(TIMEOUT)

@@ -20,8 +20,8 @@ from rosz.launch.plan import (
     describe_args,
     parse_arguments,
     plan,
-    report,
 )
+from rosz.launch.run import report
 from rosz.packages import PackageIndex
 
 

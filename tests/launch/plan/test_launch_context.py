@@ -117,6 +117,6 @@ def test_names_are_made_by_the_caller(tmp_path: Path) -> None:
 def test_reading_a_launch_file_imports_only_what_it_needs() -> None:
     import subprocess
 
-    code = "import sys, rosz.launch.plan, rosz.launch.plan.report; print(*sys.modules)"
+    code = "import sys, rosz.launch.plan, rosz.launch.run.report; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"asyncio", "shlex", "subprocess", "yaml", "zenoh"} & set(done.stdout.split())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 
 import msgspec
 import pytest
@@ -321,6 +322,24 @@ def test_values_that_are_not_parameters_are_refused(param: str, reason: str) -> 
     with pytest.raises(LaunchFileError) as caught:
         plan_of(f"<param {param}/>")
     assert reason in caught.value.reason
+
+
+@pytest.mark.parametrize(
+    ("before", "each", "after"),
+    [
+        ("", '<param name="p{}" value="1"/>', ""),
+        (NODE.format("")[:-2] + ">", '<param name="p{}" value="1"/>', "</node>"),
+        ("", '<param name="~p{}" value="1"/>', NODE.format("")),
+        ("<rosparam>", "p{}: 1\n", "</rosparam>"),
+    ],
+    ids=["global", "of a node", "private", "YAML"],
+)
+def test_fifty_thousand_parameters_are_read_fast(before: str, each: str, after: str) -> None:
+    """The time grows with their number, and not with its square: that took half a minute."""
+    text = before + "".join(map(each.format, range(50_000))) + after
+    began = time.thread_time()
+    assert len(plan_of(text).params) == 50_000
+    assert time.thread_time() - began < 12
 
 
 def test_the_log_collector_keeps_its_name() -> None:

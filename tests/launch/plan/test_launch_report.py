@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rosz.errors import LaunchError, NotFoundError
-from rosz.launch.plan import ArgDoc, LaunchText, describe_args, report
+from rosz.launch.plan import ArgDoc, LaunchText, describe_args
+from rosz.launch.run import report
 
 from .fake_context import FakeContext, plan_of
 

@@ -49,7 +49,7 @@ SLEEPERS = [
 def test_status(tmp_path: Path, network: Network, client: StatusClient) -> None:
     with launch(tmp_path, *SLEEPERS, network=network) as run:
         run.err.wait_for("[space/b-2] process has died")
-        (status,) = client.statuses()
+        (status,) = client.running().values()
     assert (status.run_id, status.pid) == (run.runner.run_id, os.getpid())
     a, b, c = status.nodes
     assert (a.name, a.type, a.state, a.detail) == ("/a", "sh -c exec sleep 600", "running", "")
@@ -60,7 +60,7 @@ def test_status(tmp_path: Path, network: Network, client: StatusClient) -> None:
     assert (b.pid, b.memory, b.uptime) == (0, 0, 0)
     assert (c.name, c.state, c.pid) == ("/c", "failed", 0)
     assert c.detail.startswith("unable to launch [c-3]: No such file or directory")
-    assert client.statuses() == []
+    assert client.running() == {}
 
 
 def test_restart(tmp_path: Path, network: Network, client: StatusClient) -> None:
@@ -69,7 +69,7 @@ def test_restart(tmp_path: Path, network: Network, client: StatusClient) -> None
         run.err.wait_for("[space/b-2] process has died")
         client.request("restart", "a")
         assert not alive(first)
-        (status,) = client.statuses()
+        (status,) = client.running().values()
         assert (status.nodes[0].restarts, status.nodes[0].state) == (1, "running")
         client.request("restart", "/space/b")
         run.err.wait_for("[space/b-2] process has died", times=2)
@@ -171,4 +171,4 @@ def test_a_reply_that_is_not_valid(network: Network, client: StatusClient) -> No
         closing(network.session.queryable(key, answer)),
         pytest.raises(LaunchError, match=f"reply of a launch at '{key}' is not valid: .*version"),
     ):
-        client.statuses()
+        client.running()

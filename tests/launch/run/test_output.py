@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from network import eventually
 
-from rosz.launch.run.output import Output
+from rosz.launch.run.output import RelayedOutput
 
 from .in_process import launch_process
 from .in_thread import TIMEOUT, alive, launch, program, shell
@@ -197,8 +197,9 @@ def _relay_below(pid: int) -> int:
     """Return the relay that a process has started."""
     for entry in Path(f"/proc/{pid}/task").iterdir():
         for child in (entry / "children").read_text().split():
-            if b"relay.py" in Path(f"/proc/{child}/cmdline").read_bytes():
-                return int(child)
+            with suppress(OSError):  # it ended meanwhile
+                if b"relay.py" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    return int(child)
     raise AssertionError(f"{pid} has no relay")
 
 
@@ -237,7 +238,7 @@ def test_no_descriptors_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     def refuse(*_: object) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr(Output, "screen", refuse)
+    monkeypatch.setattr(RelayedOutput, "screen", refuse)
     nodes = shell("n", "exit 0", output="screen"), shell("m", "exec sleep 600")
     with launch(tmp_path, *nodes) as run:
         run.err.wait_for("cannot write the output of 'n-1' to the screen: Too many open files")

@@ -8,49 +8,44 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from rosz.errors import LaunchError, RoszError
+from rosz.errors import RoszError
 from rosz.launch.run.console import Console
 from rosz.launch.run.excerpt import Excerpt, Position
-from rosz.launch.run.host import OnExit, OnRead, OnStart, ProcessSpec
+from rosz.launch.run.host import OnRead, OnReport
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.process_tree import Usage
-from rosz.launch.run.supervisor import Process, State, Supervisor, Timeouts
+from rosz.launch.run.protocol import (
+    Exited,
+    Gone,
+    ProcessRequest,
+    Refused,
+    Signal,
+    Started,
+    Timeouts,
+)
+from rosz.launch.run.supervisor import LaunchProcess, ProcessState, Supervisor
 
 from .in_thread import program
 
 
-class Stuck:
-    """A child that does not end, as in a blocked driver or on a machine that is lost."""
-
-    shown = logs = place = ""
-
-    def __init__(self, pid: int, *, pending: bool) -> None:
-        self.pid = pid
-        self.pending = pending
-        self.signals: list[int] = []
-
-    def signal(self, number: int) -> None:
-        self.signals.append(number)
-
-    def remains(self) -> bool:
-        return True
-
-
 class Machine:
-    """A machine that starts such children, and keeps the callbacks."""
+    """A machine whose processes do not end, as in a blocked driver or when it is lost."""
 
     place = "far"
 
     def __init__(self, *, pending: bool) -> None:
+        self.report: OnReport = lambda _: None
         self._pending = pending
-        self.children: list[Stuck] = []
-        self.callbacks: list[tuple[OnExit, OnStart]] = []
+        self.serials: list[int] = []
+        self.signals: list[tuple[int, int]] = []
 
-    def start(self, spec: ProcessSpec, on_exit: OnExit, on_start: OnStart) -> Stuck:
-        del spec
-        self.children.append(Stuck(len(self.children) + 1, pending=self._pending))
-        self.callbacks.append((on_exit, on_start))
-        return self.children[-1]
+    def send(self, request: ProcessRequest) -> None:
+        if isinstance(request, Signal):
+            self.signals.append((request.serial, request.number))
+            return
+        self.serials.append(request.serial)
+        if not self._pending:
+            self.report(Started(request.serial, len(self.serials), "", ""))
 
     def measure(self, done: Callable[[dict[int, Usage]], None]) -> None:
         done({})
@@ -75,19 +70,19 @@ class Record(Supervisor):
         self.said: list[str] = []
         (self.process,) = self.processes
 
-    def started(self, process: Process) -> None:
+    def started(self, process: LaunchProcess) -> None:
         del process
         self.said.append("started")
 
-    def failed_to_start(self, process: Process, error: RoszError) -> None:
+    def failed_to_start(self, process: LaunchProcess, error: RoszError) -> None:
         del process, error
         self.said.append("failed")
 
-    def died(self, process: Process) -> None:
+    def died(self, process: LaunchProcess) -> None:
         del process
         self.said.append("died")
 
-    def finished(self, process: Process) -> None:
+    def finished(self, process: LaunchProcess) -> None:
         del process
         self.said.append("finished")
 
@@ -120,13 +115,13 @@ def test_late_reports_of_a_process_do_not_affect_its_successor(loop: Loop, pendi
     process = record.process
     process.begin()
     process.restart()
-    while len(machine.children) == 1:
+    while len(machine.serials) == 1:
         loop.step(5.0)
     before = [*record.said]
-    on_exit, on_start = machine.callbacks[0]
-    on_start(LaunchError("refused"))
-    on_exit(-9, ())
-    assert process.state is State.RUNNING
+    first, second = machine.serials
+    for report in (Refused(first, "refused"), Exited(first, -9, ()), Gone(first)):
+        machine.report(report)
+    assert process.state is ProcessState.RUNNING
     assert process.alive
     assert record.said == before
-    assert machine.children[1].signals == []
+    assert second not in dict(machine.signals)

@@ -14,19 +14,19 @@ from rosz.launch.run.excerpt import Excerpt
 from rosz.launch.run.loop import Loop
 from rosz.launch.run.protocol import (
     PROTOCOL,
+    AgentSetup,
     AgentVersion,
     OutputRead,
     Ready,
-    Setup,
     Shown,
+    Timeouts,
     rosz_version,
 )
 from rosz.launch.run.remote import RemoteHost
-from rosz.launch.run.supervisor import Timeouts
 
 from .in_thread import HERE
 
-SETUP = Setup(
+SETUP = AgentSetup(
     run_id="1", tag="t", domain=0, meet=(), silence=30.0, timeouts=Timeouts(), prefixed=False
 )
 FAR = MachinePlan(

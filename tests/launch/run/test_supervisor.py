@@ -146,7 +146,7 @@ def test_sigint_is_enough_for_python(tmp_path: Path) -> None:
     ready = tmp_path / "ready"
     script = (
         "import sys, time\n"
-        "try:\n open(sys.argv[1], 'w').close(); time.sleep(600)\n"
+        "try:\n open(sys.argv[1], 'w').close()\n while True: time.sleep(0.01)\n"
         "except KeyboardInterrupt: open(sys.argv[1], 'w').write('bye')\n"
     )
     with launch(tmp_path, program("p", sys.executable, "-S", "-c", script, str(ready))) as run:

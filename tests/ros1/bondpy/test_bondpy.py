@@ -60,26 +60,6 @@ result = [
 ]
 """
 
-MACHINE = """
-import io
-from smclib import statemap
-stream = io.StringIO()
-a, b = statemap.State("A", 1), statemap.State("B", 2)
-machine = statemap.FSMContext(a)
-machine.setDebugFlag(True)
-machine.setDebugStream(stream)
-steps = []
-for name, args in (("getState", ()), ("setState", (b,)), ("setState", (3,)), ("pushState", (a,)),
-        ("pushState", (b,)), ("getStateStackDepth", ()), ("popState", ()), ("emptyStateStack", ()),
-        ("popState", ()), ("isStateStackEmpty", ()), ("pushState", (3,)), ("clearState", ()),
-        ("getState", ()), ("getPreviousState", ()), ("pushState", (a,)), ("getStateStackDepth", ()),
-        ("getTransition", ()), ("getDebugFlag", ())):
-    found = tried(getattr(machine, name), *args)
-    steps.append([name, "state" if "object at" in str(found) else found])
-lines = [line for line in stream.getvalue().splitlines() if "EMPTY" not in line]
-result = [steps, lines, a.getName(), b.getId(), machine.getDebugStream() is stream]
-"""
-
 END = """
     import sys, rosz.ros1, rospy
     from bondpy import bondpy
@@ -99,11 +79,6 @@ END = """
 def test_states_and_messages_are_those_of_ros_1() -> None:
     snippet = oracle.apart.WITHOUT_NETWORK + STATES
     assert oracle.apart.differences(snippet, "bondpy", "python3-bondpy") == []
-
-
-@pytest.mark.ros1
-def test_state_machines_are_those_of_ros_1() -> None:
-    oracle.same(MACHINE, "smclib.statemap", "python3-smclib")
 
 
 @pytest.mark.system

@@ -176,7 +176,7 @@ for name in "cv_bridge", "cv_bridge.core", "image_geometry":
 def test_a_row_may_end_with_padding() -> None:
     pytest.importorskip("cv2")
     from rosz.msgs.sensor_msgs.msg import Image
-    from rosz.ros1.cv_bridge import CvBridge
+    from rosz.ros1.libraries.cv_bridge import CvBridge
 
     padded = Image(height=2, width=2, encoding="mono8", step=3, data=b"abcdef")
     assert CvBridge().imgmsg_to_cv2(padded).tobytes() == b"abde"
@@ -186,16 +186,7 @@ def test_a_row_may_end_with_padding() -> None:
 def test_what_a_format_does_not_hold_is_refused(form: str) -> None:
     np = pytest.importorskip("numpy")
     pytest.importorskip("cv2")
-    from rosz.ros1.cv_bridge import CvBridge, CvBridgeError
+    from rosz.ros1.libraries.cv_bridge import CvBridge, CvBridgeError
 
     with pytest.raises(CvBridgeError, match=form):
         CvBridge().cv2_to_compressed_imgmsg(np.zeros((2, 2, 3), np.uint8), form)
-
-
-def test_older_versions_of_opencv_lack_a_function(monkeypatch: pytest.MonkeyPatch) -> None:
-    cv2 = pytest.importorskip("cv2")
-    from rosz.ros1.cv_bridge.encodings import type_of
-
-    monkeypatch.delattr(cv2, "CV_MAKETYPE", raising=False)
-    type_of.cache_clear()
-    assert (type_of("bgr8"), type_of("32FC4")) == (cv2.CV_8UC3, cv2.CV_32FC4)

@@ -1,21 +1,9 @@
-"""diagnostic_updater and diagnostic_analysis beside ROS 1's."""
+"""diagnostic_updater beside ROS 1's."""
 
 from __future__ import annotations
 
-import sys
-import time
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-
 import oracle.apart
 import pytest
-
-from rosz.msgs.builtin_interfaces.msg import Time
-from rosz.msgs.diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rosz.msgs.std_msgs.msg import Header
-from rosz.ros1.diagnostic_analysis import sparse
-from rosz.ros1.diagnostic_analysis.exporter import LogExporter
 
 SNIPPET = """
 import diagnostic_updater as d
@@ -117,47 +105,3 @@ def test_statuses_are_those_of_ros_1() -> None:
     snippet = oracle.apart.WITHOUT_NETWORK + SNIPPET
     found = oracle.apart.differences(snippet, "diagnostic_updater", "python3-diagnostic-updater")
     assert found == []
-
-
-def test_diagnostics_become_csv_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def array(seconds: int, *details: tuple[str, str]) -> DiagnosticArray:
-        values = [KeyValue(*detail) for detail in details]
-        one = DiagnosticStatus(level=1, name="/a (b).c #1", message="x, y ", values=values)
-        return DiagnosticArray(header=Header(stamp=Time(seconds, 0)), status=[one])
-
-    def at(seconds: int) -> str:
-        return time.strftime("%Y/%m/%d %H:%M:%S", time.localtime(seconds))
-
-    recorded: list[tuple[str, Any, Any]] = [
-        ("/diagnostics", array(0, ("k,1", "1,2"), ("l", "a\nb")), None),
-        ("/other", None, None),
-        ("/diagnostics", array(60, ("l", "c"), ("m", "d")), None),
-    ]
-    bag = SimpleNamespace(read_messages=lambda: recorded)
-    monkeypatch.setitem(sys.modules, "rosbag", SimpleNamespace(Bag=lambda _: bag))
-    exporter = LogExporter(str(tmp_path / "out"), "log.bag")
-    exporter.process_log()
-    exporter.finish_logfile()
-    file = exporter.get_filename("/a (b).c #1")
-    assert file == str(tmp_path / "out" / "__a_bc_1.csv")
-    assert Path(file).read_text().splitlines() == [
-        "Timestamp,Level,Message,Hardware ID,k1,l,m",
-        f"{at(0)},1,x  y,,1 2,a  b",
-        f"{at(60)},1,x  y,,,c,d",
-    ]
-    assert exporter.get_filename("none") is None
-    exporter.remove_files()
-    assert not Path(file).exists()
-
-
-def test_rows_are_thinned_out(tmp_path: Path) -> None:
-    file = tmp_path / "a.csv"
-    file.write_text("".join(f"{at},x\n" for at in range(10)))
-    skipped, shortened = (
-        sparse.make_sparse_skip(str(file), 4),
-        sparse.make_sparse_length(str(file), 3),
-    )
-    assert skipped == str(tmp_path / "a_sparse.csv")
-    assert [line[0] for line in Path(skipped).read_text().splitlines()] == ["0", "4", "8"]
-    assert shortened == str(tmp_path / "a_sprs_len.csv")
-    assert [line[0] for line in Path(shortened).read_text().splitlines()] == ["0", "3", "6", "9"]

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from rosz.errors import SourceError
-from rosz.ros1.dynamic_reconfigure import find_files
-from rosz.ros1.dynamic_reconfigure.cfgfile import load, run
+from rosz.ros1.client.dynamic_reconfigure import find_files
+from rosz.ros1.client.dynamic_reconfigure.cfgfile import load, run
 from rosz.ros1.importer import install, uninstall
 
 from .cfg_samples import BROKEN, OLD, SAMPLES

@@ -15,8 +15,8 @@ from oracle import PYTHON, require
 from rosz.msgs.dynamic_reconfigure.msg import Config as ConfigMessage
 from rosz.msgs.dynamic_reconfigure.msg import GroupState
 from rosz.reconfigure.messages import describe, encode_config, pack_description
-from rosz.ros1.dynamic_reconfigure import get_parameter_names
-from rosz.ros1.dynamic_reconfigure.cfgfile import load
+from rosz.ros1.client.dynamic_reconfigure import get_parameter_names
+from rosz.ros1.client.dynamic_reconfigure.cfgfile import load
 from rosz.ros1.importer import install, uninstall
 from rosz.ros1.modules import submodule
 

@@ -29,7 +29,7 @@ def callback(*found):
 
 @pytest.fixture(autouse=True)
 def time_without_a_node(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rosz.ros1.rospy.Time.now", lambda: Time.from_sec(time.time()))
+    monkeypatch.setattr("rosz.ros1.client.rospy.Time.now", lambda: Time.from_sec(time.time()))
 
 
 def events(seed: int, spread: float) -> list[tuple[int, float]]:

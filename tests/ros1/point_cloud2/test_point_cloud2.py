@@ -10,7 +10,7 @@ import oracle
 import pytest
 
 from rosz.msgs.sensor_msgs.msg import PointField
-from rosz.ros1 import point_cloud2
+from rosz.ros1.client import point_cloud2
 from rosz.ros1.importer import install, uninstall
 
 SNIPPET = """

@@ -12,9 +12,9 @@ from typing import Any
 import oracle
 import pytest
 
-from rosz.ros1 import PyKDL, tf2_geometry_msgs, tf2_kdl, tf2_ros, tf_conversions
-from rosz.ros1.rospy import Time
-from rosz.ros1.tf_conversions import posemath
+from rosz.ros1.client import tf2_geometry_msgs, tf2_ros
+from rosz.ros1.client.rospy import Time
+from rosz.ros1.libraries import PyKDL, tf2_kdl, tf_conversions
 
 _VALUES = """
 import copy, math, random
@@ -266,7 +266,7 @@ class _OldOpenCv:
 
 def test_camera_parameters() -> None:
     column = {(row, 0): float(row + 1) for row in range(3)}
-    frame = posemath.fromCameraParams(_OldOpenCv, None, column)
+    frame = tf_conversions.fromCameraParams(_OldOpenCv, None, column)
     assert frame == PyKDL.Frame(PyKDL.Rotation.RotX(math.pi / 2), PyKDL.Vector(1, 2, 3))
     assert tf_conversions.toMatrix(frame)[3].tolist() == [0, 0, 0, 1]
 

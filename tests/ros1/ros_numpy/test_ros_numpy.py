@@ -18,10 +18,10 @@ from rosz.msgs.geometry_msgs.msg import (  # noqa: E402
 )
 from rosz.msgs.nav_msgs.msg import MapMetaData, OccupancyGrid  # noqa: E402
 from rosz.msgs.sensor_msgs.msg import Image, PointCloud2, PointField  # noqa: E402
-from rosz.ros1 import point_cloud2, ros_numpy  # noqa: E402
-from rosz.ros1.ros_numpy import image, registry  # noqa: E402
-from rosz.ros1.rospy.numpy_msg import numpy_msg  # noqa: E402
-from rosz.ros1.tf import transformations  # noqa: E402
+from rosz.ros1.client import point_cloud2  # noqa: E402
+from rosz.ros1.client.rospy.numpy_msg import numpy_msg  # noqa: E402
+from rosz.ros1.client.tf import transformations  # noqa: E402
+from rosz.ros1.libraries import ros_numpy  # noqa: E402
 
 RECORDS = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<f4"), ("v", "<u2", (3,))]
 
@@ -70,10 +70,10 @@ def test_poses_are_matrices(kind: type[Any]) -> None:
         ros_numpy.msgify(kind, np.eye(3))
 
 
-@pytest.mark.parametrize("encoding", sorted(image.name_to_dtypes))
+@pytest.mark.parametrize("encoding", sorted(ros_numpy.name_to_dtypes))
 @pytest.mark.parametrize("order", "<>")
 def test_images(encoding: str, order: str) -> None:
-    kind, channels = image.name_to_dtypes[encoding]
+    kind, channels = ros_numpy.name_to_dtypes[encoding]
     shape = (3, 4) if channels == 1 else (3, 4, channels)
     pixels = np.arange(12 * channels).reshape(shape).astype(np.dtype(kind).newbyteorder(order))
     message = ros_numpy.msgify(Image, pixels, encoding=encoding)
@@ -115,7 +115,7 @@ def test_clouds() -> None:
     assert (cloud.header.frame_id, cloud.height, cloud.width, cloud.is_dense) == ("map", 1, 5, True)
     np.testing.assert_equal(ros_numpy.numpify(cloud), points)
     assert ros_numpy.numpify(cloud, squeeze=False).shape == (1, 5)
-    assert ros_numpy.point_cloud2.pointcloud2_to_xyz_array(cloud).tolist() == [
+    assert ros_numpy.pointcloud2_to_xyz_array(cloud).tolist() == [
         [at, at + 10, at + 20] for at in range(5)
     ]
     made = ros_numpy.msgify(numpy_msg(PointCloud2), points)
@@ -156,10 +156,10 @@ def test_fields_and_types() -> None:
 
 
 def test_colors() -> None:
-    split = ros_numpy.point_cloud2.split_rgb_field(records(4))
+    split = ros_numpy.split_rgb_field(records(4))
     assert split.dtype.names == ("x", "y", "z", "v", "r", "g", "b")
     assert [split[name].tolist() for name in "rgb"] == [[0, 1, 2, 3], [0, 2, 4, 6], [0, 3, 6, 9]]
-    merged = ros_numpy.point_cloud2.merge_rgb_fields(split)
+    merged = ros_numpy.merge_rgb_fields(split)
     assert merged.dtype.names == ("x", "y", "z", "v", "rgb")
     np.testing.assert_equal(merged["rgb"].view(np.uint32), np.arange(4, dtype=np.uint32) * 0x010203)
 
@@ -167,20 +167,20 @@ def test_colors() -> None:
 def test_nans_are_left_out() -> None:
     points = records(3)
     points["y"][1] = np.nan
-    assert len(ros_numpy.point_cloud2.get_xyz_points(points)) == 2
-    assert ros_numpy.point_cloud2.get_xyz_points(points, remove_nans=False).shape == (3, 3)
+    assert len(ros_numpy.get_xyz_points(points)) == 2
+    assert ros_numpy.get_xyz_points(points, remove_nans=False).shape == (3, 3)
     assert not ros_numpy.msgify(PointCloud2, points).is_dense
 
 
 def test_own_types_are_declared() -> None:
-    @registry.converts_to_numpy(Wrench)
+    @ros_numpy.converts_to_numpy(Wrench)
     def of_wrench(message: Wrench, factor: int) -> float:
         return message.force.x * factor
 
     try:
         assert ros_numpy.numpify(Wrench(force=Vector3(2.0, 0.0, 0.0)), 3) == 6
     finally:
-        del registry._to_numpy[Wrench, False]
+        del ros_numpy._to_numpy[Wrench, False]
     assert ros_numpy.numpify(None) is None
     for wrong in (Wrench(), list[Any](), "text"):
         with pytest.raises(ValueError, match="expected"):
@@ -188,4 +188,4 @@ def test_own_types_are_declared() -> None:
     with pytest.raises(ValueError, match="no Wrench of an array"):
         ros_numpy.msgify(Wrench, np.zeros(3))
     with pytest.raises(TypeError, match="message class"):
-        registry.converts_to_numpy(int)
+        ros_numpy.converts_to_numpy(int)

@@ -13,7 +13,7 @@ from network import Network, eventually
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.node import Node
-from rosz.ros1.rosmsg import MODE_SRV, ROSMsgException, get_msg_text, get_srv_text, list_types
+from rosz.ros1.tools.rosmsg import MODE_SRV, ROSMsgException, get_msg_text, get_srv_text, list_types
 
 _BEGIN = """
 import json
@@ -291,7 +291,7 @@ def test_publish_by_type_name(network: Network, robot: Node) -> None:
 
 
 def test_rates() -> None:
-    from rosz.ros1.rostopic import ROSTopicHz
+    from rosz.ros1.tools.rostopic import ROSTopicHz
 
     meter = ROSTopicHz(-1, filter_expr=lambda m: m != "no", use_wtime=True)
     assert meter.get_hz() is None
@@ -326,8 +326,8 @@ def test_rosmsg() -> None:
 
 
 def test_packages_with_messages() -> None:
-    from rosz.ros1 import rosmsg
-    from rosz.ros1.rospkg import RosPack
+    from rosz.ros1.tools import rosmsg
+    from rosz.ros1.tools.rospkg import RosPack
 
     packs = RosPack()
     assert "std_msgs" in dict(rosmsg.iterate_packages(packs, rosmsg.MODE_MSG))

@@ -7,7 +7,7 @@ from textwrap import dedent
 import pytest
 from oracle import same
 
-from rosz.ros1.rosgraph import names, network
+from rosz.ros1.tools.rosgraph import names, network
 
 NAMES = ["", "/", "a", "/a", "/a/", "a/b", "/a/b", "~a", "~", "~/a", "a//b", "//", "1a", "a b",
          "a-b", "_a", "a/", "/a/b/", "é", "a~", None]  # fmt: skip

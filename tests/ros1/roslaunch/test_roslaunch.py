@@ -81,7 +81,6 @@ result = [
     [tried(resolve_args, text, context) for text in texts],
     resolve_args("$(dirname)/y", {"filename": "/f/g.launch"}),
     [tried(convert_value, *pair) for pair in pairs],
-    [tried(roslaunch.config.namespaces_of, name) for name in ("/", "/a", "/a/b", "", None, 1)],
     [env["ROS_NAMESPACE"], env["K"], env["ROS_MASTER_URI"]],
     tried(roslaunch.rlutil.resolve_launch_arguments, ["no_such_package", "x.launch"]),
     tried(roslaunch.rlutil.resolve_launch_arguments, ["no_such.launch"]),

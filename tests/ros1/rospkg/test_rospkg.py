@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from oracle import same
 
-from rosz.ros1 import rospkg
-from rosz.ros1.roslib import packages as roslib
+from rosz.ros1.tools import rospkg
+from rosz.ros1.tools.roslib import packages as roslib
 
 ARM = """<package format="2">
   <name>arm</name>

@@ -6,7 +6,7 @@ import pytest
 
 from rosz.msgs.nav_msgs.msg import OccupancyGrid
 from rosz.msgs.sensor_msgs.msg import Image, JointState, LaserScan, MultiDOFJointState
-from rosz.ros1.rospy.numpy_msg import numpy_msg
+from rosz.ros1.client.rospy.numpy_msg import numpy_msg
 
 from .rospy_programs import Printed
 

@@ -11,8 +11,8 @@ from rosz.msgs.geometry_msgs.msg import PointStamped
 from rosz.msgs.rosgraph_msgs.msg import TopicStatistics
 from rosz.msgs.std_msgs.msg import Header, String
 from rosz.node import MessageInfo
-from rosz.params.api import Params
-from rosz.ros1.rospy.statistics import Statistics
+from rosz.params.replica import Params
+from rosz.ros1.client.rospy.statistics import Statistics
 
 from .rospy_programs import Printed
 

@@ -12,7 +12,7 @@ from network import Network
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.msgs.std_msgs.msg import Header
-from rosz.ros1.rospy import rostime
+from rosz.ros1.client.rospy import rostime
 
 from .rospy_programs import Printed
 

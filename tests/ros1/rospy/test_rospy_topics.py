@@ -363,7 +363,7 @@ def test_errors_of_values_are_those_of_genpy(kind: str, value: str, text: str) -
     from importlib import import_module
 
     from rosz.errors import EncodeError
-    from rosz.ros1.rospy.msg import encode
+    from rosz.ros1.client.rospy.msg import encode
 
     module, _, name = kind.rpartition(".")
     message = getattr(import_module(f"rosz.msgs.{module}"), name)(*eval(f"({value},)"))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rosz.errors import DecodeError
-from rosz.message.tuples import LONGEST_TUPLE, LongTuple, decoder
+from rosz.message.tuples import LONGEST_TUPLE, LongTuple, tuple_decoder
 from rosz.msgs.geometry_msgs.msg import PoseWithCovariance
 from rosz.msgs.std_msgs.msg import Float32MultiArray, String
 from rosz.typestore import TypeStore, shipped_packages, shipped_types
@@ -25,7 +25,7 @@ def received(size: int) -> tuple[Any, Any]:
     """Return a received sequence, and the tuple that it stands for."""
     numbers: Any = tuple(map(float, range(size)))
     data = Float32MultiArray(data=list(numbers)).to_cdr()
-    return decoder(Float32MultiArray)(data).data, numbers
+    return tuple_decoder(Float32MultiArray)(data).data, numbers
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -78,15 +78,15 @@ def test_all_shipped_types_have_tuples() -> None:
         for name in shipped_types(package, "msg"):
             cls = store.message(f"{package}/{name}")
             kind: Any = cls
-            made = decoder(kind)(cls().to_cdr())
+            made = tuple_decoder(kind)(cls().to_cdr())
             assert type(made) is cls
             assert "array(" not in repr(made)
-            found += decoder(kind) is not cls._decode
+            found += tuple_decoder(kind) is not cls._decode
     assert found > 20
 
 
 def test_big_endian_and_damaged_bytes() -> None:
-    decode = decoder(Float32MultiArray)
+    decode = tuple_decoder(Float32MultiArray)
     layout = b"\0\0\0\0\0\0\0\0"
     big = b"\0\0\0\0" + layout + b"\0\0\0\1" + b"\x3f\x80\0\0"
     assert decode(big).data == (1.0,)
@@ -96,8 +96,10 @@ def test_big_endian_and_damaged_bytes() -> None:
 
 
 def test_other_types_keep_their_decoder() -> None:
-    assert decoder(String) is String._decode
-    assert decoder(PoseWithCovariance)(PoseWithCovariance().to_cdr()).covariance == (0.0,) * 36
+    assert tuple_decoder(String) is String._decode
+    assert (
+        tuple_decoder(PoseWithCovariance)(PoseWithCovariance().to_cdr()).covariance == (0.0,) * 36
+    )
 
 
 def test_on_topics_and_in_services(printed: Printed) -> None:

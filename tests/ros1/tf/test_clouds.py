@@ -15,7 +15,7 @@ from rosz.msgs.geometry_msgs.msg import Quaternion, Transform, TransformStamped,
 from rosz.msgs.sensor_msgs.msg import PointCloud2
 from rosz.msgs.sensor_msgs.msg import PointField as F
 from rosz.msgs.std_msgs.msg import Header
-from rosz.ros1.tf2_sensor_msgs import do_transform_cloud
+from rosz.ros1.client.tf2_sensor_msgs import do_transform_cloud
 from rosz.transforms import pose_of, transform_cloud
 
 XYZ = [F("x", 0, F.FLOAT32, 1), F("y", 4, F.FLOAT32, 1), F("z", 8, F.FLOAT32, 1)]

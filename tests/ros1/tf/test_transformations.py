@@ -13,7 +13,7 @@ import pytest
 from oracle import same
 
 from rosz.errors import UsageError
-from rosz.ros1.tf import transformations as t
+from rosz.ros1.client.tf import transformations as t
 
 ORDERS = [
     f"{frame}{a}{b}{c}"
@@ -225,7 +225,7 @@ def test_without_numpy_it_says_what_to_install() -> None:
     script = """
         import sys
         sys.modules["numpy"] = None
-        from rosz.ros1.tf import transformations as t
+        from rosz.ros1.client.tf import transformations as t
         print(t.euler_from_quaternion([0, 0, 0, 1]))
         try:
             t.quaternion_from_euler(0, 0, 1)

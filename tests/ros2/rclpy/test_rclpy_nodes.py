@@ -118,6 +118,22 @@ def test_transient_local_reaches_late_subscriptions(world: World) -> None:
     assert heard == ["here"]
 
 
+def test_kept_messages_are_not_for_volatile_subscriptions(world: World) -> None:
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    publisher = world.node.create_publisher(String, "map", latched)
+    publisher.publish(String(data="kept"))
+    heard: list[str] = []
+    world.node.create_subscription(String, "map", lambda m: heard.append(m.data), 10)
+    volatile = QoSProfile(depth=1)
+    world.node.create_subscription(String, "map", lambda m: heard.append(m.data), volatile)
+    eventually(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
+    for _ in range(10):
+        world.executor.spin_once(timeout_sec=0.03)
+    publisher.publish(String(data="live"))
+    world.spin_until(lambda: len(heard) == 2, "two messages")
+    assert heard == ["live", "live"]
+
+
 def test_timers(world: World) -> None:
     ticks: list[int] = []
     timer = world.node.create_timer(0.01, lambda: ticks.append(1))

@@ -1,0 +1,37 @@
+"""Bags made of bags: filtered, converted, divided, repaired. May import the formats."""
+
+from __future__ import annotations
+
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from rosz.bags.edit.editing import Transfer, divide, merged
+    from rosz.bags.edit.repair import (
+        Copied,
+        TypeDifference,
+        check_bag,
+        find_differences,
+        recover,
+        rewrite,
+    )
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "editing": "Transfer divide merged",
+            "repair": "Copied TypeDifference check_bag find_differences recover rewrite",
+        },
+    )
+
+__all__ = (
+    "Copied",
+    "Transfer",
+    "TypeDifference",
+    "check_bag",
+    "divide",
+    "find_differences",
+    "merged",
+    "recover",
+    "rewrite",
+)

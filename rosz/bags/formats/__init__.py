@@ -1,0 +1,26 @@
+"""The formats of bags: MCAP, that of ROS 1, and rosbag2."""
+
+from __future__ import annotations
+
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from rosz.bags.formats.ros1_form import ros1_definition
+    from rosz.bags.formats.ros1_reader import Ros1Reader
+    from rosz.bags.formats.writing import removed_unfinished
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "ros1_form": "ros1_definition",
+            "ros1_reader": "Ros1Reader",
+            "writing": "removed_unfinished",
+        },
+    )
+
+__all__ = (
+    "Ros1Reader",
+    "removed_unfinished",
+    "ros1_definition",
+)

@@ -1,0 +1,8 @@
+"""Playing bags. May import nodes and what edits bags."""
+
+from __future__ import annotations
+
+from rosz.bags.play.options import PlayOptions, Progress
+from rosz.bags.play.player import Player
+
+__all__ = ("PlayOptions", "Player", "Progress")

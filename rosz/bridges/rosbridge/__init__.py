@@ -1,0 +1,27 @@
+"""The rosbridge protocol: web pages and other programs take part in the network by websocket.
+
+``operations`` and ``plain`` have values; the others use sockets and nodes. Needs the extra
+``rosz[websocket]``.
+"""
+
+from __future__ import annotations
+
+from rosz.bridges.rosbridge.plain import Spelling
+from rosz.bridges.rosbridge.rosapi import RosApi
+from rosz.bridges.rosbridge.server import (
+    PORT,
+    RosbridgeLimits,
+    RosbridgeSettings,
+    WebsocketBridge,
+    open_bridge,
+)
+
+__all__ = (
+    "PORT",
+    "RosApi",
+    "RosbridgeLimits",
+    "RosbridgeSettings",
+    "Spelling",
+    "WebsocketBridge",
+    "open_bridge",
+)

@@ -1,0 +1,23 @@
+"""Images: what their encodings mean, as arrays of numpy, and as pictures.
+
+Needs the extra ``rosz[vision]``. May import message classes, numpy and OpenCV.
+"""
+
+from __future__ import annotations
+
+from rosz.images.arrays import convert, image_array, saturated, without_channel
+from rosz.images.encodings import Encoding, ImageError, depth_of, parse_encoding, type_of
+from rosz.images.pictures import pixels
+
+__all__ = (
+    "Encoding",
+    "ImageError",
+    "convert",
+    "depth_of",
+    "image_array",
+    "parse_encoding",
+    "pixels",
+    "saturated",
+    "type_of",
+    "without_channel",
+)

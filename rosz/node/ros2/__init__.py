@@ -1,0 +1,25 @@
+"""A node as ROS 2 knows it: the services of its parameters, and the definitions of its types.
+
+`detector` finds out when a node needs these services, `parameters` provides them, `events`
+publishes their changes, `values` converts them, and `types` serves definitions and requests those
+of other nodes. The names are imported on first use, as few nodes need them.
+"""
+
+from __future__ import annotations
+
+from rosz.lazy import exports_of
+
+TYPE_CHECKING = False  # typing takes long to import
+if TYPE_CHECKING:
+    from rosz.node.ros2.types import request_action, request_definition, request_type
+    from rosz.node.ros2.values import to_ros2
+else:
+    __getattr__ = exports_of(
+        __name__,
+        {
+            "types": "request_action request_definition request_type",
+            "values": "to_ros2",
+        },
+    )
+
+__all__ = ("request_action", "request_definition", "request_type", "to_ros2")

@@ -1,0 +1,1 @@
+"""ROS 1's tools as Python modules, such as roslaunch and rosbag."""

@@ -1,0 +1,57 @@
+"""The command: plays random histories, or explores small worlds, for as long as is asked for."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from params.simulation.exploration import SCRIPTS, explore  # found by the line above
+from params.simulation.histories import play_seed
+from params.simulation.violation import Violation
+
+
+def play(steps: int, seed: int, length: int, rounds: int) -> int:
+    """Play histories from one seed on, until they have taken a number of steps."""
+    made = findings = 0
+    first, begun, told = seed, time.monotonic(), time.monotonic()
+    while made < steps:
+        try:
+            made += play_seed(seed, length, rounds).steps
+        except Violation as violation:
+            findings += 1
+            print(f"seed {seed}: {violation}\n", flush=True)
+        seed += 1
+        if time.monotonic() - told > 10:
+            told = time.monotonic()
+            print(f"seed {seed}, {made} steps, {findings} findings", file=sys.stderr, flush=True)
+    print(
+        f"{seed - first} histories (seeds {first} to {seed - 1}), {made} steps,"
+        f" {findings} findings, {time.monotonic() - begun:.0f} s"
+    )
+    return findings
+
+
+def main() -> int:
+    """Read the arguments and do what they say."""
+    parser = argparse.ArgumentParser(prog="python -m tests.params.simulation")
+    parser.add_argument("--steps", type=int, default=1_000_000, help="steps of cores to take")
+    parser.add_argument("--seed", type=int, default=0, help="first seed")
+    parser.add_argument("--length", type=int, default=60, help="actions before a quiet time")
+    parser.add_argument("--rounds", type=int, default=1, help="quiet times in a history")
+    parser.add_argument("--explore", choices=sorted(SCRIPTS), help="explore a small world instead")
+    parser.add_argument("--states", type=int, default=1_000_000, help="states to explore at most")
+    arguments = parser.parse_args()
+    if arguments.explore:
+        result = explore(SCRIPTS[arguments.explore], arguments.states)
+        print(result)
+        return int(bool(result.finding))
+    findings = play(arguments.steps, arguments.seed, arguments.length, arguments.rounds)
+    return int(findings > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,24 @@
+"""The error that tells what does not hold, with all that led to it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from .process import Process
+    from .world import World
+
+
+class Violation(AssertionError):
+    """Something that must hold does not; the text has the trace of what led to it."""
+
+
+def fail(world: World, process: Process, text: str) -> NoReturn:
+    """Raise a `Violation`.
+
+    Args:
+        world: The world.
+        process: The process whose core is wrong.
+        text: What is wrong.
+    """
+    raise Violation(f"{process.zid} {text}\n{world.setting}\nseed {world.seed}\n{world.story()}")
