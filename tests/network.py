@@ -42,6 +42,8 @@ silent links and calls their servers, which therefore counts as never, too."""
 
 T = TypeVar("T", bound="Any")
 _ROOT = Path(__file__).parent.parent
+_RESERVED: list[socket.socket] = []
+"""Sockets of the ports that tests of this process were given."""
 WHOLE_LINES = (
     "print = lambda *words, end='\\n', flush=False, write=print: "
     "write(' '.join(map(str, words)) + end, end='', flush=flush)\n"
@@ -68,10 +70,16 @@ def repeats(usual: int, full: int) -> int:
 
 
 def free_port() -> int:
-    """Return a loopback port that nobody listens at."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Return a loopback port that nobody listens at, and that the system gives to nobody else.
+
+    A socket stays bound to it, and listens to nothing: connections are refused, and a program that
+    names the port may listen, as `SO_REUSEADDR` allows.
+    """
+    probe = socket.socket()
+    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    probe.bind(("127.0.0.1", 0))
+    _RESERVED.append(probe)
+    return int(probe.getsockname()[1])
 
 
 def eventually(

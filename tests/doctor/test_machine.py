@@ -7,7 +7,7 @@ import socket
 from collections.abc import Iterator
 
 import pytest
-from network import Network
+from network import Network, free_port
 
 from rosz.doctor.machine import check_segments
 from rosz.session import why_refused
@@ -27,9 +27,7 @@ def mute() -> Iterator[str]:
 @pytest.fixture
 def closed() -> str:
     """An endpoint that nobody listens at."""
-    with socket.socket() as server:
-        server.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 def test_nobody_at_all_is_no_error(doctor: Doctor) -> None:

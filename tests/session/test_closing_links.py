@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from network import eventually
+from network import eventually, free_port
 
 from rosz.session import LocalPeers, Session, SessionConfig
 from rosz.session.opening import open_raw
@@ -41,8 +41,7 @@ def settings(port: int, host: str) -> tuple[SessionConfig, SessionConfig]:
 
 @pytest.fixture
 def port() -> int:
-    with socket.create_server(("", 0)) as server:
-        return int(server.getsockname()[1])
+    return free_port()
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "[::]", "127.0.0.1"])

@@ -90,9 +90,11 @@ class ClientTopics(Generic[M]):
             shared = next((s for s in self._subscriptions.values() if queue in s.queues), None)
             shared = shared or self._subscriptions.get(key)
             if shared is None:
-                shared = _SharedSubscription(self._node, self._make, topic, cls)
-                self._subscriptions[key] = shared
-            shared.add(queue, offer)
+                self._subscriptions[key] = _SharedSubscription(
+                    self._node, self._make, topic, cls, {queue: offer}
+                )
+            else:
+                shared.add(queue, offer)
 
     def unsubscribe(self, queue: TopicQueue[M]) -> None:
         """Give a queue no more messages; the last queue of a topic ends the subscription."""
@@ -138,13 +140,20 @@ class _SharedSubscription(Generic[M]):
         queues: The queues, with the functions that take their messages.
     """
 
-    def __init__(self, node: Node, make: MakeMessage[M], topic: str, cls: type[Any] | None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        make: MakeMessage[M],
+        topic: str,
+        cls: type[Any] | None,
+        queues: dict[TopicQueue[M], Offer[M]],
+    ) -> None:
         self._node = node
         self._make = make
         self._topic = topic
         self._cls = cls
         self._classes: dict[tuple[str, str], type[Any] | None] = {}
-        self.queues: dict[TopicQueue[M], Offer[M]] = {}
+        self.queues = queues  # publishers may send once they see the subscription
         self._latching: dict[bytes, bool] = {}
         self._kept: dict[bytes, M] = {}
         self._lock = threading.RLock()
