@@ -238,6 +238,22 @@ class Subscription(Entity, Generic[M]):
                         receive=self._queue.receive,
                     )
 
+    def _receive_replay(self, decoder: SampleDecoder, reply: Reply) -> None:
+        """Put a replayed sample into the queue, behind the live ones that it may overtake."""
+        if self._callback is None and self._waits_for(reply, decoder):
+            with self._making, within(self.node.program), suppress(ClosedError):
+                if self._queue_worker is None:
+                    self._queue_worker = self.keep(
+                        Worker(f"rosz-sub{self.name}", self._put_replay, logger=self.node.log)
+                    )
+                self._queue_worker.submit((reply, decoder))
+        else:
+            self._receive(reply, decoder)
+
+    def _put_replay(self, item: _Item) -> None:
+        self._await_live(item)
+        self._queue.put(item)
+
     def _receive_message(self, sample: LocalSample) -> None:
         """Put a message of this process into the queue.
 
@@ -257,26 +273,28 @@ class Subscription(Entity, Generic[M]):
         """Dispatch an item, and all that have come until there is none."""
         items, dispatch = self._queue.items, self._dispatch
         while True:
-            sample, decoder = item
-            if decoder is not None and isinstance(sample, Reply):
-                self._await_live(sample, decoder)
-            dispatch(sample, decoder)
+            self._await_live(item)
+            dispatch(*item)
             try:
                 item = items.popleft()
             except IndexError:
                 return
 
-    def _await_live(self, replayed: Reply, decoder: SampleDecoder) -> None:
+    def _await_live(self, item: _Item) -> None:
         """Wait for the live samples up to a replayed one that was published since the start."""
-        try:
-            sequence, published, source = read_attachment(replayed.attachment or b"")
-        except DecodeError:
-            return  # `_dispatch` reports it
         deadline = time.monotonic() + _LIVE_SECONDS
-        while published > self._history.opened and decoder.last(source) < sequence:
-            if self._queue.closed or time.monotonic() >= deadline:
-                return
+        while self._waits_for(*item) and not self._queue.closed and time.monotonic() < deadline:
             time.sleep(_POLL_SECONDS)
+
+    def _waits_for(self, sample: AnySample, decoder: SampleDecoder | None) -> bool:
+        """Return whether live samples are missing up to a replayed one."""
+        if decoder is None or not isinstance(sample, Reply):
+            return False
+        try:
+            sequence, published, source = read_attachment(sample.attachment or b"")
+        except DecodeError:
+            return False  # whoever decodes the sample reports it
+        return published > self._history.opened and decoder.last(source) < sequence
 
     def _dispatch(self, sample: AnySample, decoder: SampleDecoder | None = None) -> None:
         """Decode a sample, and call the callback with the message."""
@@ -397,7 +415,7 @@ class Subscription(Entity, Generic[M]):
             decoder.expect_replay(gid(format_token(publisher)))
             # Samples with a lifespan, such as lines of /rosout, are events: late joiners skip them.
             lasting = publisher.qos.lifespan == FOREVER
-            receive = partial(self._receive, decoder=decoder)
+            receive = partial(self._receive_replay, decoder)
             history = _History(receive, self._history.start(lasting=lasting), lasting=lasting)
             self._request_history(publisher, publisher.qos.depth, history.take, history.finish)
 
