@@ -44,7 +44,20 @@ def port() -> int:
     return free_port()
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "[::]", "127.0.0.1"])
+def has_ipv6() -> bool:
+    with suppress(OSError), socket.create_server(("::1", 0), family=socket.AF_INET6):
+        return True
+    return False
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "0.0.0.0",
+        pytest.param("[::]", marks=pytest.mark.skipif(not has_ipv6(), reason="needs IPv6")),
+        "127.0.0.1",
+    ],
+)
 def test_links_close_at_once(port: int, host: str) -> None:
     hub, leaf = settings(port, host)
     with Session.open(hub), Session.open(leaf):
