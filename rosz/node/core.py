@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from rosz import names
 from rosz.errors import ClosedError
@@ -28,6 +28,16 @@ if TYPE_CHECKING:
     from rosz.params.replica import Params
 
 P = TypeVar("P", bound=Closable)
+
+
+class ParameterOwner(Protocol):
+    """A program that decides on the parameters of its node, as those of rclpy do."""
+
+    def describe(self, names: Sequence[str]) -> list[Any]:
+        """Return the descriptors of parameters; none if one is not declared."""
+
+    def change(self, parameters: Sequence[Any]) -> Any:
+        """Set all parameters or none, and return the result for the one who asked."""
 
 
 class NodeCore(Closing):
@@ -47,6 +57,7 @@ class NodeCore(Closing):
         log: Log of the node.
         process: Token of the process of the node.
         program: The program that made the node, if the process runs several.
+        parameter_owner: Who decides on its parameters; anybody may set them if None.
     """
 
     def __init__(
@@ -62,6 +73,7 @@ class NodeCore(Closing):
     ) -> None:
         self._owns_context = context is None
         self.program: Program | None = current()
+        self.parameter_owner: ParameterOwner | None = None
         if anonymous:
             # ROS 1 counts milliseconds, but has one node in a process.
             name = names.anonymous(name, socket.gethostname(), os.getpid(), time.time_ns())

@@ -52,6 +52,8 @@ _Handler = Callable[[Any], Any]
 
 _DOT = "."
 _SIM_TIME = "use_sim_time"
+_DESCRIBES_TYPES = "start_type_description_service"
+"""A parameter of every node of rclpy."""
 
 
 class Ros2Parameters:
@@ -72,12 +74,25 @@ class Ros2Parameters:
         return {_DOT.join(path[len(self._base) :]): (path, value) for path, value in leaves}
 
     def get(self, names: Iterable[str]) -> list[ParameterValue]:
-        """Return the values of some parameters; "not set" for those that do not exist."""
+        """Return the values of some parameters; "not set" for those that do not exist.
+
+        Of a program that declares its parameters, none if one of them is not declared, as rclpy.
+        """
         values = self._all()
+        names = list(names)
+        if self._node.parameter_owner is not None and not values.keys() >= set(names):
+            return []
         return [to_ros2(values[name]) if name in values else ParameterValue() for name in names]
 
     def describe(self, names: Iterable[str]) -> list[ParameterDescriptor]:
         """Return descriptions of some parameters, which may be set to values of any type."""
+        owner = self._node.parameter_owner
+        if owner is not None:
+            own = _described(_DESCRIBES_TYPES, True)
+            wanted = list(names)
+            described = owner.describe([name for name in wanted if name != own.name])
+            by_name = {each.name: each for each in (*described, own)}
+            return [by_name[name] for name in wanted if name in by_name]
         values = self._all()
         return [
             _described(name, values[name]) if name in values else ParameterDescriptor(name)
@@ -115,6 +130,8 @@ class Ros2Parameters:
     def _all(self) -> dict[str, Value]:
         """Return the values by name, with ``use_sim_time``, which every node of ROS 2 has."""
         values = {name: value for name, (_, value) in self.values().items()}
+        if self._node.parameter_owner is not None:
+            values = {_DESCRIBES_TYPES: True, **values}
         return {_SIM_TIME: self._node.clock.simulated, **values}
 
     def _change(self, parameter: Parameter, present: Mapping[str, tuple[Path, Value]]) -> Change:
@@ -236,6 +253,9 @@ class Ros2ParameterServices:
         return kinds
 
     def _set(self, parameters: Iterable[Parameter]) -> SetParametersResult:
+        if self.node.parameter_owner is not None:
+            result: SetParametersResult = self.node.parameter_owner.change(list(parameters))
+            return result
         try:
             self._parameters.write(parameters)
         except (ParamError, ClosedError) as error:

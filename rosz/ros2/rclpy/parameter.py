@@ -8,11 +8,16 @@ other programs set is checked and applied by the executor, as with ROS 2's param
 from __future__ import annotations
 
 import array
+import math
+import threading
 from collections.abc import Callable, Sequence
 from enum import IntEnum
+from functools import partial
 from typing import Any
 
-from rosz.errors import UsageError
+from msgspec.structs import replace
+
+from rosz.errors import RoszError, UsageError
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, ParameterValue, SetParametersResult
 from rosz.node import Node as RoszNode
@@ -29,6 +34,8 @@ from rosz.ros2.rclpy.exceptions import (
 __all__ = ("PARAMETER_SEPARATOR_STRING", "NodeParameters", "Parameter", "get_parameter_value")
 
 PARAMETER_SEPARATOR_STRING = "."
+_SPIN_SECONDS = 10.0
+"""Time limit for the executor to set what another program sets."""
 
 
 class Parameter:
@@ -204,6 +211,7 @@ class NodeParameters:
         self._rosz_known: dict[str, Parameter] = {}
         self._rosz_descriptors: dict[str, ParameterDescriptor] = {}
         self._rosz_checks: list[Callable[[list[Parameter]], Any]] = []
+        node.parameter_owner = _DeclaredParameters(self, call_soon)
 
     def declare_parameter(
         self,
@@ -363,9 +371,14 @@ class NodeParameters:
         declared, given = self._rosz_known[parameter.name].type_, parameter.type_
         if descriptor.read_only:
             return f"Trying to set a read-only parameter: {parameter.name}."
-        if descriptor.dynamic_typing or declared is given or _Type.NOT_SET in {declared, given}:
-            return ""
-        return f"Wrong parameter type, expected 'Type.{declared.name}' got 'Type.{given.name}'"
+        if given is _Type.NOT_SET and not descriptor.dynamic_typing:
+            return "Static parameter cannot be undeclared"
+        if not descriptor.dynamic_typing and declared not in {given, _Type.NOT_SET}:
+            return f"Wrong parameter type, expected '{declared:d}' got '{given:d}'"
+        for limits in (*descriptor.integer_range, *descriptor.floating_point_range):
+            if given in {_Type.INTEGER, _Type.DOUBLE}:
+                return _outside(parameter, limits)
+        return ""
 
     def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
         """Call a function that may refuse parameters before they are set."""
@@ -382,6 +395,64 @@ class NodeParameters:
             if not result.successful:
                 return result.reason or "a callback refuses it"
         return ""
+
+
+class _DeclaredParameters:
+    """Answers for the declared parameters of a node when another program asks for them."""
+
+    def __init__(
+        self, node: NodeParameters, call_soon: Callable[[Callable[[], object]], None]
+    ) -> None:
+        self._node = node
+        self._call_soon = call_soon
+
+    def describe(self, names: Sequence[str]) -> list[ParameterDescriptor]:
+        """Return the descriptors of parameters; none if one is not declared."""
+        try:
+            kinds = [parameter.type_ for parameter in self._node.get_parameters(names)]
+        except (ParameterNotDeclaredException, ParameterUninitializedException):
+            return []
+        return [
+            replace(self._node.describe_parameter(name), name=name, type=int(kind))
+            for name, kind in zip(names, kinds, strict=True)
+        ]
+
+    def change(self, parameters: Sequence[ParameterMessage]) -> SetParametersResult:
+        """Let the executor set all parameters or none, since callbacks check them."""
+        results: list[SetParametersResult] = []
+        done = threading.Event()
+
+        def change() -> None:
+            try:
+                own = [Parameter.from_parameter_msg(parameter) for parameter in parameters]
+                results.append(self._node.set_parameters_atomically(own))
+            except RoszError as error:
+                results.append(SetParametersResult(successful=False, reason=str(error)))
+            finally:
+                done.set()
+
+        self._call_soon(change)
+        if not done.wait(_SPIN_SECONDS) or not results:
+            reason = f"the node has not spun for {_SPIN_SECONDS:g} s"
+            return SetParametersResult(successful=False, reason=reason)
+        return results[0]
+
+
+def _outside(parameter: Parameter, limits: Any) -> str:
+    """Return why a number is not in a range; empty if it is."""
+    low, high, step = limits.from_value, limits.to_value, limits.step
+    name, value = parameter.name, parameter.value
+    near = partial(math.isclose, rel_tol=1e-9)
+    if near(value, low) or near(value, high):
+        return ""
+    if not low < value < high:
+        return f"Parameter {name} out of range. Min: {low}, Max: {high}, value: {value}"
+    if step and not near(round((value - low) / step) * step + low, value):
+        return (
+            f"The parameter value for {name} is not a valid step. Min: {low}, max: {high}, value:"
+            f" {value}, step: {step}"
+        )
+    return ""
 
 
 def _path(name: str) -> str:

@@ -11,7 +11,13 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ClosedError, ServiceError
-from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rosz.msgs.rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rosz.msgs.rcl_interfaces.srv import SetParameters
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.ros2.rclpy import exceptions, executors
@@ -263,7 +269,7 @@ def test_set_and_check_parameters(world: World) -> None:
     assert node.get_parameter("speed").value == 2.5
     (wrong,) = node.set_parameters([Parameter("speed", value="fast")])
     assert not wrong.successful
-    assert wrong.reason == "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.STRING'"
+    assert wrong.reason == "Wrong parameter type, expected '3' got '4'"
     assert not node.set_parameters_atomically([Parameter("fixed", value=2)]).successful
 
     def check(parameters: list[Parameter]) -> SetParametersResult:
@@ -275,6 +281,56 @@ def test_set_and_check_parameters(world: World) -> None:
     assert node.get_parameter("speed").value == 2.5
     node.remove_on_set_parameters_callback(check)
     assert node.set_parameters([Parameter("speed", value=9.0)])[0].successful
+
+
+def test_numbers_in_a_range(world: World) -> None:
+    node = world.node
+    even = IntegerRange(from_value=0, to_value=10, step=2)
+    node.declare_parameter("even", 4, ParameterDescriptor(integer_range=[even]))
+    limits = FloatingPointRange(from_value=-1.0, to_value=1.0)
+    node.declare_parameter("share", 0.5, ParameterDescriptor(floating_point_range=[limits]))
+    given = [("even", 10), ("even", 12), ("even", 5), ("share", -1.0), ("share", -1.5)]
+    results = node.set_parameters([Parameter(name, value=value) for name, value in given])
+    assert [result.reason for result in results] == [
+        "",
+        "Parameter even out of range. Min: 0, Max: 10, value: 12",
+        "The parameter value for even is not a valid step. Min: 0, max: 10, value: 5, step: 2",
+        "",
+        "Parameter share out of range. Min: -1.0, Max: 1.0, value: -1.5",
+    ]
+    (deleted,) = node.set_parameters([Parameter("even")])
+    assert deleted.reason == "Static parameter cannot be undeclared"
+    assert node.get_parameter("even").value == 10
+
+
+def test_callbacks_check_what_others_set(world: World, network: Network) -> None:
+    """They run on the executor's thread, once for each change, and tell why they refuse it."""
+    node, calls = world.node, list[tuple[str, Any]]()
+    node.declare_parameter("speed", 1.5)
+
+    def check(parameters: list[Parameter]) -> SetParametersResult:
+        calls.append((threading.current_thread().name, parameters[0].value))
+        return SetParametersResult(successful=parameters[0].value < 3, reason="too fast")
+
+    node.add_on_set_parameters_callback(check)
+    results: list[Any] = []
+
+    def ask() -> None:
+        asker = network.node("asker")
+        with asker.client("/robot/set_parameters", SetParameters) as client:
+            client.wait_for_service(TIMEOUT)
+            for speed in (9.0, 2.0):
+                message = Parameter("speed", value=speed).to_parameter_msg()
+                results.extend(client([message]).results)
+
+    network.thread(ask)
+    world.spin_until(lambda: len(results) == 2, "the answers")
+    assert [(each.successful, each.reason) for each in results] == [
+        (False, "too fast"),
+        (True, ""),
+    ]
+    assert calls == [(threading.current_thread().name, 9.0), (threading.current_thread().name, 2.0)]
+    assert node.get_parameter("speed").value == 2.0
 
 
 def test_parameters_of_the_command_line(start: Start) -> None:
