@@ -8,6 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rosz.bags.formats.ros1_form import ros1_definition
     from rosz.bags.formats.ros1_reader import Ros1Reader
+    from rosz.bags.formats.rosbag2_writer import write_metadata
     from rosz.bags.formats.writing import removed_unfinished
 else:
     __getattr__ = exports_of(
@@ -15,6 +16,7 @@ else:
         {
             "ros1_form": "ros1_definition",
             "ros1_reader": "Ros1Reader",
+            "rosbag2_writer": "write_metadata",
             "writing": "removed_unfinished",
         },
     )
@@ -23,4 +25,5 @@ __all__ = (
     "Ros1Reader",
     "removed_unfinished",
     "ros1_definition",
+    "write_metadata",
 )

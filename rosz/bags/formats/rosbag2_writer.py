@@ -9,10 +9,10 @@ from __future__ import annotations
 import os
 import sqlite3
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -25,6 +25,7 @@ from rosz.bags.bag import (
     Payload,
     compression_library,
 )
+from rosz.bags.formats.mcap_reader import McapReader
 from rosz.bags.formats.mcap_writer import McapWriter
 from rosz.bags.formats.qos_text import format_profiles, profile_rows
 from rosz.bags.formats.rosbag2_reader import METADATA, METADATA_RECORD, Storage
@@ -247,38 +248,85 @@ class Rosbag2Writer(Closing):
             self._part.add_metadata(METADATA_RECORD, {"serialized_metadata": inner})
         finally:
             self._part.close()
-        whole = {"rosbag2_bagfile_information": information}
-        file = self.path / METADATA
-        with FileErrors(file, "cannot write it"):
-            text = yaml.safe_dump(whole, sort_keys=False, allow_unicode=True)
-            file.write_text(text, encoding="utf-8")
+        _write_file(self.path / METADATA, information)
 
     def _check(self) -> None:
         if self._closed:
             raise ClosedError(f"the bag '{self.path}' is closed")
 
     def _information(self) -> dict[str, Any]:
-        duration = max(0, self._end - self._start)
-        covered = {
-            "duration": {"nanoseconds": duration},
-            "starting_time": {"nanoseconds_since_epoch": self._start},
-            "message_count": sum(self._counts.values()),
-        }
+        counts = {channel: self._counts[handle] for channel, handle in self._handles.items()}
+        part = _Part(self._part.path.name, self._start, self._end, counts)
+        compressed = {"compression_format": "zstd", "compression_mode": "MESSAGE"}
+        more = compressed if self._by_message else {}
+        return _describe(self._storage, [part]) | more | {"custom_data": self._custom or None}
+
+
+class _Part(NamedTuple):
+    """A file of a bag: its name, the times of its first and last message, and their numbers."""
+
+    name: str
+    start: int
+    end: int
+    counts: Mapping[Channel, int]
+
+    @property
+    def covered(self) -> dict[str, Any]:
         return {
-            "version": _VERSION,
-            "storage_identifier": self._storage,
-            **covered,
-            "topics_with_message_count": [
-                {"topic_metadata": _topic_row(channel), "message_count": self._counts[handle]}
-                for channel, handle in self._handles.items()
-            ],
-            "compression_format": "zstd" if self._by_message else "",
-            "compression_mode": "MESSAGE" if self._by_message else "",
-            "relative_file_paths": [self._part.path.name],
-            "files": [{"path": self._part.path.name, **covered}],
-            "custom_data": self._custom or None,
-            "ros_distro": _DISTRIBUTION,
+            "duration": {"nanoseconds": max(0, self.end - self.start)},
+            "starting_time": {"nanoseconds_since_epoch": self.start},
+            "message_count": sum(self.counts.values()),
         }
+
+
+def _describe(storage: Storage, parts: Sequence[_Part]) -> dict[str, Any]:
+    """Return the metadata of a bag of some files."""
+    counts: dict[Channel, int] = {}
+    for part in parts:
+        for channel, count in part.counts.items():
+            counts[channel] = counts.get(channel, 0) + count
+    start, end = min(part.start for part in parts), max(part.end for part in parts)
+    return {
+        "version": _VERSION,
+        "storage_identifier": storage,
+        **_Part("", start, end, counts).covered,
+        "topics_with_message_count": [
+            {"topic_metadata": _topic_row(channel), "message_count": count}
+            for channel, count in counts.items()
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [part.name for part in parts],
+        "files": [{"path": part.name, **part.covered} for part in parts],
+        "custom_data": None,
+        "ros_distro": _DISTRIBUTION,
+    }
+
+
+def write_metadata(folder: Path) -> None:
+    """Write the metadata of a folder of MCAP files, which makes it a bag of rosbag2.
+
+    Raises:
+        BagError: A file cannot be read, or the metadata cannot be written.
+    """
+    parts: list[_Part] = []
+    for file in sorted(folder.glob("*.mcap")):
+        with McapReader(file) as reader:
+            counts: dict[Channel, int] = {}
+            for channel in reader.channels:
+                form = msgspec.structs.replace(channel, node="", md5="")
+                counts[form] = counts.get(form, 0) + reader.count(channel)
+            parts.append(_Part(file.name, reader.start, reader.end, counts))
+    _write_file(folder / METADATA, _describe("mcap", parts))
+
+
+def _write_file(file: Path, information: Mapping[str, Any]) -> None:
+    import yaml  # slow to import, and most bags do without
+
+    whole = {"rosbag2_bagfile_information": information}
+    with FileErrors(file, "cannot write it"):
+        text = yaml.safe_dump(whole, sort_keys=False, allow_unicode=True)
+        file.write_text(text, encoding="utf-8")
 
 
 def _topic_row(channel: Channel) -> dict[str, Any]:
