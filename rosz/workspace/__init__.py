@@ -10,6 +10,7 @@ from rosz.lazy import exports_of
 
 TYPE_CHECKING = False  # typing takes longer to import than everything else here
 if TYPE_CHECKING:
+    from rosz.workspace.ament import LICENSES, AmentPackage
     from rosz.workspace.checks import Checked, check, find_packages
     from rosz.workspace.creation import create, write_setup
     from rosz.workspace.editor import editor_folder, write_stubs
@@ -20,6 +21,7 @@ else:
     __getattr__ = exports_of(
         __name__,
         {
+            "ament": "LICENSES AmentPackage",
             "checks": "Checked check find_packages",
             "creation": "create write_setup",
             "editor": "editor_folder write_stubs",
@@ -30,6 +32,8 @@ else:
     )
 
 __all__ = (
+    "LICENSES",
+    "AmentPackage",
     "Checked",
     "Generator",
     "Migration",
