@@ -44,7 +44,7 @@ LONGEST_KEY = 32768
 """Largest number of bytes of a key expression of Zenoh."""
 
 _VALID = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*", re.ASCII)
-_BASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+_BASE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)  # ROS 2 hides names that begin with "_"
 _PART = re.compile(r"[A-Za-z0-9_/]", re.ASCII)
 _LOGS = ("/rosout", "/rosout_agg")
 
