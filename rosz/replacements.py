@@ -32,7 +32,6 @@ COMMANDS = {
     "gazebo": _GAZEBO,
     "gzclient": _GAZEBO,
     "gzserver": _GAZEBO,
-    "ros2": "'rosz topic', 'rosz node', 'rosz param' and so on take its place: rosz --help",
     "rosclean": "the size of log files is bounded; remove old ones by hand",
     "rosdep": _NOTHING_TO_INSTALL,
     "rosinstall": "git gets sources; a package below 'src' of the workspace is found as it is",

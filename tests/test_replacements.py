@@ -51,9 +51,9 @@ def test_what_it_says_is_one_line_of_commands_that_are_there(name: str) -> None:
 
 
 def test_a_command_in_the_shell(network: Network) -> None:
-    done = evaluate(network, "rosdep install x; colcon build; ros2 topic list")
+    done = evaluate(network, "rosdep install x; colcon build; wstool update")
     lines = done.stderr.splitlines()
-    names = "rosdep", "colcon", "ros2"
+    names = "rosdep", "colcon", "wstool"
     assert lines == [f"ERROR: rosz has no '{name}': {instead_of(name)}" for name in names]
     assert (done.returncode, done.stdout) == (2, "")
 

@@ -113,6 +113,10 @@ def candidates(line: Line) -> list[str]:
         return HELPERS[first](line) if len(rest) < _HELPER_WORDS.get(first, 2) else []
     if rest == ["help"]:
         return [*pages(), *COMMANDS]
+    if rest[:1] == ["ros2"]:
+        from rosz.cli.ros2 import words_after
+
+        return words_after(rest[1:])
     if rest[:1] == ["help"]:
         rest = rest[1:]
     if not rest:

@@ -27,9 +27,10 @@ ALIASES = {
     **{name: name for name in OLD_NAMES},
     "catkin_create_pkg": "pkg create --bare",
     "catkin_make": "pkg check --setup",
+    "ros2": "ros2",
     "xacro": "run xacro xacro",
 }
-"""ROS 1's commands, with the commands of rosz that replace them."""
+"""Commands of ROS, with the commands of rosz that replace them."""
 
 _HELPERS = ("roscd", "rosed", "rosls", "rospack")
 

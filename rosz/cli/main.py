@@ -136,6 +136,10 @@ def _dispatch(argv: list[str]) -> int:
         from rosz.cli.complete import complete
 
         return complete(words)
+    if name == "ros2":
+        from rosz.cli.ros2 import main as run_ros2
+
+        return run_ros2(words)
     if name in OLD_NAMES:
         return _invoke(load(OLD_NAMES[name]), words, name)
     if name not in COMMANDS:
