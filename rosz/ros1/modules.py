@@ -162,14 +162,33 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
     "rclpy.clock": {"ros2.rclpy.time": "Clock ClockType ROSClock"},
     "rclpy.context": {"ros2.rclpy.context": "Context"},
     "rclpy.duration": {"ros2.rclpy.time": "Duration Infinite"},
+    "rclpy.event_handler": {
+        "ros2.rclpy.events": "EventHandler PublisherEventCallbacks QoSEventHandler=EventHandler"
+        " QoSMessageLostInfo=MessageLostInfo QoSPublisherMatchedInfo=MatchedInfo"
+        " QoSSubscriptionMatchedInfo=MatchedInfo SubscriptionEventCallbacks"
+        " IncompatibleTypeInfo UnsupportedEventTypeError",
+    },
     "rclpy.executors": {
         "ros2.rclpy.executors": "Entity Executor ExternalShutdownException MultiThreadedExecutor"
-        " ShutdownException SingleThreadedExecutor TimeoutException",
+        " ShutdownException SingleThreadedExecutor TimeoutException await_or_execute=completed",
     },
+    "rclpy.guard_condition": {"ros2.rclpy.events": "GuardCondition"},
+    "rclpy.impl": {"ros2.rclpy": "logging"},
+    "rclpy.impl.logging_severity": {"ros2.rclpy.logging": "LoggingSeverity"},
+    "rclpy.impl.rcutils_logger": {"ros2.rclpy.logging": "RcutilsLogger"},
     "rclpy.parameter": {
-        "ros2.rclpy.parameter": "PARAMETER_SEPARATOR_STRING Parameter get_parameter_value",
+        "ros2.rclpy.parameter": "PARAMETER_SEPARATOR_STRING Parameter get_parameter_value"
+        " parameter_dict_from_yaml_file",
     },
     "rclpy.publisher": {"ros2.rclpy.entities": "Publisher"},
+    "rclpy.qos_event": {
+        "ros2.rclpy.events": "PublisherEventCallbacks SubscriptionEventCallbacks"
+        " UnsupportedEventTypeError",
+    },
+    "rclpy.qos_overriding_options": {
+        "ros2.rclpy.qos": "InvalidQosOverridesError QoSOverridingOptions"
+        " QosCallbackResult=SetParametersResult",
+    },
     "rclpy.service": {"ros2.rclpy.entities": "Service"},
     "rclpy.subscription": {"ros2.rclpy.entities": "Subscription"},
     "rclpy.task": {"ros2.rclpy.executors": "Future Task"},
@@ -179,6 +198,7 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         "ros2.rclpy.program": "get_default_context get_rmw_implementation_identifier ok"
         " remove_ros_args shutdown try_shutdown",
     },
+    "rclpy.wait_for_message": {"ros2.rclpy.program": "wait_for_message"},
     "ros_numpy.geometry": {
         "ros1.libraries.ros_numpy": "Point Pose Quaternion Transform Vector3 converts_from_numpy"
         " converts_to_numpy np numpy_to_point numpy_to_pose numpy_to_quat numpy_to_transform"

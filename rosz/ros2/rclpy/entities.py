@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -11,11 +12,13 @@ from rosz.errors import ServiceError, WaitTimeout
 from rosz.message import Message
 from rosz.message import Service as ServiceType
 from rosz.node import Clock as RoszClock
+from rosz.node import MessageInfo
 from rosz.node import Node as RoszNode
 from rosz.node import Publisher as RoszPublisher
 from rosz.node import Subscription as RoszSubscription
 from rosz.node import Timer as RoszTimer
 from rosz.qos import QoS
+from rosz.ros2.rclpy.events import EventHandler, SubscriptionEventCallbacks, handlers_of
 from rosz.ros2.rclpy.executors import CallbackGroup, Future, completed, in_background
 from rosz.ros2.rclpy.time import Clock
 from rosz.session import LONGEST_WAIT
@@ -27,10 +30,16 @@ _CHECK_PERIOD = 0.5
 class Publisher:
     """Publish messages on a topic; made by ``Node.create_publisher``."""
 
-    def __init__(self, publisher: RoszPublisher[Any], qos_profile: Any) -> None:
+    def __init__(
+        self,
+        publisher: RoszPublisher[Any],
+        qos_profile: Any,
+        events: dict[str, EventHandler],
+    ) -> None:
         self._publisher = publisher
         self.msg_type: type[Any] = publisher.message_type
         self.qos_profile: Any = qos_profile
+        self.event_handlers: list[EventHandler] = list(events.values())
 
     def publish(self, msg: Any) -> None:
         """Publish a message, or the bytes of an encoded one.
@@ -55,6 +64,13 @@ class Publisher:
         """Return the number of subscriptions that receive the messages."""
         return len(self._publisher.subscribers())
 
+    def wait_for_all_acked(self, timeout: Any = None) -> bool:  # noqa: ARG002  # rclpy's
+        """Return True: subscriptions of Zenoh do not acknowledge, as with rmw_zenoh."""
+        return True
+
+    def assert_liveliness(self) -> None:
+        """Do nothing: the liveliness of a process is that of its session."""
+
     def destroy(self) -> None:
         """Close the publisher."""
         self._publisher.close()
@@ -72,33 +88,43 @@ class Subscription:
         node: RoszNode,
         topic: str,
         msg_type: type[Message],
-        callback: Callable[[Any], Any],
+        callback: Callable[..., Any],
         qos: QoS,
         *,
         raw: bool,
         group: CallbackGroup,
         wake: Callable[[], None],
+        events: SubscriptionEventCallbacks | None = None,
     ) -> None:
         self.msg_type: type[Any] = msg_type
-        self.callback: Callable[[Any], Any] = callback
+        self.callback: Callable[..., Any] = callback
         self.callback_group: CallbackGroup = group
         self._wake = wake
         depth = None if qos.history == "keep_all" else max(qos.depth, 1)
         self._queue: deque[Any] = deque(maxlen=depth)
+        self._with_info = _takes_info(callback)
+        self._lost: EventHandler | None = None
         self._subscription: RoszSubscription[Any] = node.subscription(
-            topic, msg_type, self._receive, qos=qos, raw=raw
+            topic, msg_type, self._receive, qos=qos, raw=raw, with_info=True
         )
+        handlers = handlers_of(self._subscription, events, group, wake)
+        self._lost = handlers.get("message_lost")
+        self.event_handlers: list[EventHandler] = list(handlers.values())
 
-    def _receive(self, message: Any) -> None:
-        self._queue.append(message)
+    def _receive(self, message: Any, info: MessageInfo) -> None:
+        if info.lost and self._lost is not None:
+            self._lost.count(info.lost)
+        self._queue.append((message, info))
         self._wake()
 
     def take(self) -> Callable[[], Any] | None:
         """Return a function that handles the oldest message; None if there is none."""
         try:
-            message = self._queue.popleft()
+            message, info = self._queue.popleft()
         except IndexError:
             return None
+        if self._with_info:
+            return lambda: self.callback(message, _ros2_info(info))
         return lambda: self.callback(message)
 
     @property
@@ -114,6 +140,29 @@ class Subscription:
         """Close the subscription."""
         self._subscription.close()
         self._queue.clear()
+
+
+def _takes_info(callback: Callable[..., Any]) -> bool:
+    """Return whether a callback takes a message and its info, and not the message alone."""
+    try:
+        signature = inspect.signature(callback)
+    except ValueError:  # a function of C
+        return False
+    try:
+        signature.bind(None)
+    except TypeError:
+        return True
+    return False
+
+
+def _ros2_info(info: MessageInfo) -> dict[str, Any]:
+    """Return the info of a message with rclpy's keys; times are in nanoseconds."""
+    return {
+        "source_timestamp": info.source_time,
+        "received_timestamp": info.reception_time,
+        "publication_sequence_number": info.sequence,
+        "reception_sequence_number": None,
+    }
 
 
 class _Call:

@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 from rosz.errors import RoszError
 from rosz.ros2.rclpy.context import Context, get_default_context
@@ -27,6 +27,7 @@ __all__ = (
     "Future",
     "MultiThreadedExecutor",
     "MutuallyExclusiveCallbackGroup",
+    "Ready",
     "ReentrantCallbackGroup",
     "ShutdownException",
     "SingleThreadedExecutor",
@@ -238,6 +239,14 @@ class Entity(Protocol):
         """Return the next function to call; None if nothing is ready."""
 
 
+class Ready(NamedTuple):
+    """A callback that is ready, its group, which has been entered, and its node."""
+
+    job: Job
+    group: CallbackGroup | None
+    node: Any
+
+
 class Executor:
     """Base class of executors, which run the callbacks of nodes.
 
@@ -250,7 +259,7 @@ class Executor:
         self._nodes: list[Any] = []
         self._wakeup = threading.Event()
         self._soon: deque[Job] = deque()
-        self._ready: deque[tuple[Job, CallbackGroup]] = deque()
+        self._ready: deque[Ready] = deque()
         self._is_shutdown = False
         self.context.on_shutdown(self.wake)
 
@@ -332,6 +341,27 @@ class Executor:
         future.add_done_callback(lambda _: self.wake())
         self._once(timeout_sec, future.done)
 
+    def wait_for_ready_callbacks(self, timeout_sec: float | None = None) -> Ready:
+        """Wait until a callback is ready, and return it; executors of programs call this.
+
+        Args:
+            timeout_sec: Time limit in seconds; none when not given.
+
+        Returns:
+            A function that runs the callback, its group and its node.
+
+        Raises:
+            TimeoutException: No callback is ready in time.
+            ShutdownException: The executor or the context is shut down.
+            ExternalShutdownException: A signal shut the context down.
+        """
+        ready = self._wait(timeout_sec, lambda: False)
+        if ready is not None:
+            return ready
+        if self._is_shutdown or not self.context.ok():
+            raise ShutdownException
+        raise TimeoutException(f"no callback is ready after {timeout_sec} s")
+
     def shutdown(self, timeout_sec: float | None = None) -> bool:  # noqa: ARG002  # rclpy's
         """End all spinning."""
         self._is_shutdown = True
@@ -339,29 +369,33 @@ class Executor:
         return True
 
     def _once(self, timeout: float | None, finished: Callable[[], bool]) -> None:
+        ready = self._wait(timeout, finished)
+        if ready is not None:
+            self._run(ready.job, ready.group)
+
+    def _wait(self, timeout: float | None, finished: Callable[[], bool]) -> Ready | None:
         deadline = _deadline(timeout)
         while self.context.ok() and not self._is_shutdown and not finished():
             self._wakeup.clear()
             ready = self._next()
             if ready is not None:
-                self._run(*ready)
-                return
+                return ready
             left = None if deadline is None else deadline - time.monotonic()
             if left is not None and left <= 0:
-                return
+                return None
             self._wakeup.wait(left)
         if self.context.ended_by_signal:
             raise ExternalShutdownException
+        return None
 
-    def _next(self) -> tuple[Job, CallbackGroup | None] | None:
-        """Return the next job and its group, which has been entered."""
+    def _next(self) -> Ready | None:
         if self._soon:
-            return self._soon.popleft(), None
+            return Ready(self._soon.popleft(), None, None)
         if not self._ready:
             self._ready.extend(self._collect())
         return self._ready.popleft() if self._ready else None
 
-    def _collect(self) -> Iterable[tuple[Job, CallbackGroup]]:
+    def _collect(self) -> Iterable[Ready]:
         for node in self._nodes:
             for entity in node.rosz_entities():
                 group = entity.callback_group
@@ -371,7 +405,7 @@ class Executor:
                 if call is None:
                     self._leave(group)
                     continue
-                yield Task(call, executor=self).step, group
+                yield Ready(Task(call, executor=self).step, group, node)
 
     def _enter(self, _group: CallbackGroup) -> bool:
         """Begin a callback of a group; with one thread no two run at the same time anyway."""
@@ -438,7 +472,7 @@ class MultiThreadedExecutor(Executor):
         self._pool.submit(work)
         self._raise_failure()
 
-    def _next(self) -> tuple[Job, CallbackGroup | None] | None:
+    def _next(self) -> Ready | None:
         self._raise_failure()
         return super()._next()
 

@@ -11,6 +11,8 @@ from enum import IntEnum
 from typing import Any
 
 from rosz.errors import UsageError
+from rosz.msgs.rcl_interfaces.msg import LoggerLevel, SetLoggerLevelsResult
+from rosz.msgs.rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 from rosz.node import (
     Clock,
     ConsoleHandler,
@@ -21,7 +23,13 @@ from rosz.node import (
     severity_name,
 )
 
-__all__ = ("LoggingSeverity", "RcutilsLogger", "get_logger", "write_as_rclpy")
+__all__ = (
+    "LoggingSeverity",
+    "RcutilsLogger",
+    "get_logger",
+    "serve_logger_levels",
+    "write_as_rclpy",
+)
 
 _DEFAULT_FORMAT = "[{severity}] [{time}] [{name}]: {message}"
 _TOKEN = re.compile(r"\{(\w+)\}")
@@ -185,3 +193,41 @@ def get_logger(name: str) -> RcutilsLogger:
     log = NodeLog(name, clock=Clock(), rosout=False)
     write_as_rclpy(log, name)
     return RcutilsLogger(name, log)
+
+
+def serve_logger_levels(node: Any, logger: RcutilsLogger) -> None:
+    """Serve ``NODE/get_logger_levels`` and ``NODE/set_logger_levels`` of a node of rclpy.
+
+    Args:
+        node: The node.
+        logger: Logger of the node; names below its own are those of its children.
+    """
+    levels: dict[str, int] = {}
+
+    def child(name: str) -> RcutilsLogger | None:
+        if name == logger.name:
+            return logger
+        below = name.removeprefix(f"{logger.name}.")
+        return logger.get_child(below) if below != name and below else None
+
+    def get(request: Any, response: Any) -> Any:
+        response.levels = [LoggerLevel(name, levels.get(name, 0)) for name in request.names]
+        return response
+
+    def set_levels(request: Any, response: Any) -> Any:
+        for level in request.levels:
+            target = child(level.name)
+            if target is None:
+                reason = f"node {node.get_fully_qualified_name()} has no logger '{level.name}'"
+            elif level.level not in set(LoggingSeverity):
+                reason = f"{level.level} is no level; expected 0, 10, 20, 30, 40 or 50"
+            else:
+                target.set_level(level.level)
+                levels[level.name] = level.level
+                reason = ""
+            response.results.append(SetLoggerLevelsResult(successful=not reason, reason=reason))
+        return response
+
+    name = node.get_fully_qualified_name()
+    node.create_service(GetLoggerLevels, f"{name}/get_logger_levels", get)
+    node.create_service(SetLoggerLevels, f"{name}/set_logger_levels", set_levels)

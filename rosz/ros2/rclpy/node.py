@@ -11,6 +11,12 @@ from rosz.node import Node as RoszNode
 from rosz.node import simulate
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.ros2.rclpy.entities import Client, Publisher, Service, Subscription, Timer
+from rosz.ros2.rclpy.events import (
+    GuardCondition,
+    PublisherEventCallbacks,
+    SubscriptionEventCallbacks,
+    handlers_of,
+)
 from rosz.ros2.rclpy.exceptions import NotInitializedException
 from rosz.ros2.rclpy.executors import (
     CallbackGroup,
@@ -19,9 +25,9 @@ from rosz.ros2.rclpy.executors import (
     MutuallyExclusiveCallbackGroup,
     get_global_executor,
 )
-from rosz.ros2.rclpy.logging import RcutilsLogger, write_as_rclpy
+from rosz.ros2.rclpy.logging import RcutilsLogger, serve_logger_levels, write_as_rclpy
 from rosz.ros2.rclpy.parameter import NodeParameters, Parameter
-from rosz.ros2.rclpy.qos import QoSProfile, to_qos
+from rosz.ros2.rclpy.qos import QoSOverridingOptions, QoSProfile, override_qos, to_qos
 from rosz.ros2.rclpy.time import Clock, Rate, ROSClock
 from rosz.wire import Kind, Token
 
@@ -41,10 +47,10 @@ class Node(NodeParameters):
         context: Context of the node; the default one when not given.
         namespace: Namespace of the node.
         parameter_overrides: Parameters whose values replace the declared ones.
-        options: Other options of rclpy, of which only
-            ``automatically_declare_parameters_from_overrides`` has an effect. ``cli_args``,
-            ``use_global_arguments``, ``enable_rosout``, ``start_parameter_services``,
-            ``allow_undeclared_parameters`` and ``enable_logger_service`` are ignored.
+        options: Other options of rclpy, of which ``enable_logger_service`` and
+            ``automatically_declare_parameters_from_overrides`` have an effect. ``cli_args``,
+            ``use_global_arguments``, ``enable_rosout``, ``start_parameter_services`` and
+            ``allow_undeclared_parameters`` are ignored.
 
     Raises:
         NotInitializedException: ``rclpy.init`` was not called.
@@ -84,6 +90,8 @@ class Node(NodeParameters):
         self.declare_parameter("use_sim_time", self.rosz_node.clock.simulated)
         if self.get_parameter("use_sim_time").value and not self.rosz_node.clock.simulated:
             simulate(self.rosz_node)
+        if options.get("enable_logger_service"):
+            serve_logger_levels(self, RcutilsLogger(self._rosz_logger_name, self.rosz_node.log))
         if options.get("automatically_declare_parameters_from_overrides"):
             for name, value in overrides.items():
                 if not self.has_parameter(name):
@@ -98,8 +106,10 @@ class Node(NodeParameters):
         """Yield the entities with callbacks, timers first, which is rclpy's order."""
         parts = list(self._rosz_parts)
         yield from (part for part in parts if isinstance(part, Timer))
-        others = (part for part in parts if not isinstance(part, Timer))
-        yield from (part for part in others if hasattr(part, "take"))
+        for part in parts:
+            if not isinstance(part, Timer) and hasattr(part, "take"):
+                yield part
+            yield from getattr(part, "event_handlers", ())
 
     def rosz_wake(self) -> None:
         """Make the executor look for callbacks that are ready."""
@@ -134,7 +144,15 @@ class Node(NodeParameters):
     # Entities
 
     def create_publisher(
-        self, msg_type: type[Any], topic: str, qos_profile: QoSProfile | int = 10, **_options: Any
+        self,
+        msg_type: type[Any],
+        topic: str,
+        qos_profile: QoSProfile | int = 10,
+        *,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: PublisherEventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
+        publisher_class: type[Publisher] = Publisher,
     ) -> Publisher:
         """Create a publisher.
 
@@ -142,9 +160,27 @@ class Node(NodeParameters):
             msg_type: Class of the messages.
             topic: Name of the topic.
             qos_profile: Profile, or depth of the queue.
+            callback_group: Group of the event callbacks; the node's default group when not given.
+            event_callbacks: Callbacks for events, such as subscriptions that are matched.
+            qos_overriding_options: Policies that parameters may override.
+            publisher_class: Class to make.
+
+        Raises:
+            UnsupportedEventTypeError: There is no such event.
+            InvalidQosOverridesError: A parameter has no valid policy.
         """
+        qos_profile = self._rosz_qos("publisher", topic, qos_profile, qos_overriding_options)
         raw = self.rosz_node.publisher(topic, msg_type, qos=to_qos(qos_profile))
-        return self.rosz_add(Publisher(raw, qos_profile))
+        group = callback_group or self.default_callback_group
+        events = handlers_of(raw, event_callbacks, group, self.rosz_wake)
+        return self.rosz_add(publisher_class(raw, qos_profile, events))
+
+    def _rosz_qos(
+        self, kind: str, topic: str, qos: QoSProfile | int, options: QoSOverridingOptions | None
+    ) -> QoSProfile | int:
+        if options is None:
+            return qos
+        return override_qos(self, kind, self.resolve_topic_name(topic), qos, options)
 
     def create_subscription(
         self,
@@ -154,19 +190,28 @@ class Node(NodeParameters):
         qos_profile: QoSProfile | int,
         *,
         callback_group: CallbackGroup | None = None,
+        event_callbacks: SubscriptionEventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
-        **_options: Any,
     ) -> Subscription:
         """Create a subscription.
 
         Args:
             msg_type: Class of the messages.
             topic: Name of the topic.
-            callback: Function called with each message, or with its bytes if ``raw``.
+            callback: Function called with each message, or with its bytes if ``raw``; one of two
+                arguments also gets a dictionary with the times of the message.
             qos_profile: Profile, or depth of the queue.
             callback_group: Group of the callback; the node's default group when not given.
+            event_callbacks: Callbacks for events, such as messages that are lost.
+            qos_overriding_options: Policies that parameters may override.
             raw: Whether to pass encoded messages.
+
+        Raises:
+            UnsupportedEventTypeError: There is no such event.
+            InvalidQosOverridesError: A parameter has no valid policy.
         """
+        qos_profile = self._rosz_qos("subscription", topic, qos_profile, qos_overriding_options)
         return self.rosz_add(
             Subscription(
                 self.rosz_node,
@@ -177,6 +222,7 @@ class Node(NodeParameters):
                 raw=raw,
                 group=callback_group or self.default_callback_group,
                 wake=self.rosz_wake,
+                events=event_callbacks,
             )
         )
 
@@ -249,6 +295,18 @@ class Node(NodeParameters):
             Client(self.rosz_node, srv_name, srv_type, call_soon=self.rosz_call_soon)
         )
 
+    def create_guard_condition(
+        self, callback: Callable[[], Any], callback_group: CallbackGroup | None = None
+    ) -> GuardCondition:
+        """Create a guard condition, whose ``trigger`` lets the executor call a function.
+
+        Args:
+            callback: Function to call.
+            callback_group: Group of the callback; the node's default group when not given.
+        """
+        group = callback_group or self.default_callback_group
+        return self.rosz_add(GuardCondition(callback, group, self.rosz_wake))
+
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:  # noqa: ARG002
         """Create a rate, which paces a loop.
 
@@ -300,6 +358,10 @@ class Node(NodeParameters):
     def destroy_client(self, client: Client) -> bool:
         """Close a client; return whether it belonged to the node."""
         return self._rosz_destroy(client)
+
+    def destroy_guard_condition(self, guard: GuardCondition) -> bool:
+        """Remove a guard condition; return whether it belonged to the node."""
+        return self._rosz_destroy(guard)
 
     def destroy_rate(self, rate: Rate) -> bool:
         """Close a rate."""

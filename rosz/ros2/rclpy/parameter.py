@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
@@ -31,7 +32,13 @@ from rosz.ros2.rclpy.exceptions import (
     ParameterUninitializedException,
 )
 
-__all__ = ("PARAMETER_SEPARATOR_STRING", "NodeParameters", "Parameter", "get_parameter_value")
+__all__ = (
+    "PARAMETER_SEPARATOR_STRING",
+    "NodeParameters",
+    "Parameter",
+    "get_parameter_value",
+    "parameter_dict_from_yaml_file",
+)
 
 PARAMETER_SEPARATOR_STRING = "."
 _SPIN_SECONDS = 10.0
@@ -190,6 +197,58 @@ def get_parameter_value(string_value: str) -> ParameterValue:
     return Parameter("", value=value).get_parameter_value()
 
 
+def parameter_dict_from_yaml_file(
+    parameter_file: str,
+    use_wildcard: bool = False,
+    target_nodes: Sequence[str] | None = None,
+    namespace: str = "",
+) -> dict[str, ParameterMessage]:
+    """Return the parameters of a file of ROS 2's form as messages, by their names.
+
+    Args:
+        parameter_file: Path of the file: nodes, below them ``ros__parameters``.
+        use_wildcard: Whether the parameters of ``/**`` count, too; those of nodes come first.
+        target_nodes: Nodes whose parameters to take; all of the file when not given.
+        namespace: Prefix of the names.
+
+    Raises:
+        UsageError: The file cannot be read, or it lacks a node or ``ros__parameters``.
+        ParamError: It is not YAML.
+    """
+    try:
+        text = Path(parameter_file).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"cannot read '{parameter_file}': {error}") from None
+    nodes = next(read_plain(text, parameter_file), None)
+    if not isinstance(nodes, dict):
+        raise UsageError(f"'{parameter_file}' has no nodes; expected NODE: ros__parameters: …")
+    chosen = list(target_nodes or (name for name in nodes if name != _WILDCARD))
+    missing = [name for name in chosen if name not in nodes]
+    if missing:
+        raise UsageError(
+            f"'{parameter_file}' has no parameters of '{missing[0]}', only of {', '.join(nodes)}"
+        )
+    if use_wildcard and _WILDCARD in nodes:
+        chosen.insert(0, _WILDCARD)
+    values: dict[str, Any] = {}
+    for name in chosen:
+        below = nodes[name].get("ros__parameters") if isinstance(nodes[name], dict) else None
+        if not isinstance(below, dict):
+            raise UsageError(f"'{parameter_file}' has no 'ros__parameters' below '{name}'")
+        values |= _leaves(below, namespace)
+    return {name: Parameter(name, value=value).to_parameter_msg() for name, value in values.items()}
+
+
+def _leaves(values: dict[Any, Any], prefix: str) -> dict[str, Any]:
+    """Return nested parameters by their dotted names."""
+    leaves: dict[str, Any] = {}
+    for key, value in values.items():
+        name = f"{prefix}{key}"
+        leaves |= _leaves(value, f"{name}.") if isinstance(value, dict) else {name: value}
+    return leaves
+
+
+_WILDCARD = "/**"
 _MISSING = object()
 
 
@@ -210,8 +269,10 @@ class NodeParameters:
         self._rosz_update_soon = call_soon
         self._rosz_known: dict[str, Parameter] = {}
         self._rosz_descriptors: dict[str, ParameterDescriptor] = {}
+        self._rosz_before: list[Callable[[list[Parameter]], list[Parameter]]] = []
         self._rosz_checks: list[Callable[[list[Parameter]], Any]] = []
         node.parameter_owner = _DeclaredParameters(self, call_soon)
+        self._rosz_after: list[Callable[[list[Parameter]], object]] = []
 
     def declare_parameter(
         self,
@@ -253,6 +314,7 @@ class NodeParameters:
         self.rosz_node.params.watch(
             _path(name), lambda _: self._rosz_update_soon(lambda: self._rosz_update(name))
         )
+        self._rosz_tell([chosen])
         return chosen
 
     def declare_parameters(
@@ -290,11 +352,11 @@ class NodeParameters:
         except InvalidParameterTypeException as error:
             self.rosz_node.log.warning("%s; it stays %r", error, parameter.value)
             return
-        reason = self._rosz_refusal([changed])
-        if reason:
-            self.rosz_node.log.warning("parameter '%s' stays %r: %s", name, parameter.value, reason)
-        else:
-            self._rosz_known[name] = changed
+        result = self.set_parameters_atomically([changed])
+        if not result.successful:
+            self.rosz_node.log.warning(
+                "parameter '%s' stays %r: %s", name, parameter.value, result.reason
+            )
 
     def undeclare_parameter(self, name: str) -> None:
         """Remove the declaration of a parameter."""
@@ -353,16 +415,22 @@ class NodeParameters:
         Raises:
             ParameterNotDeclaredException: A parameter is not declared.
         """
+        parameter_list = list(parameter_list)
+        for change in self._rosz_before:
+            parameter_list = list(change(parameter_list))
+        if not parameter_list:
+            return SetParametersResult(successful=False, reason="no parameter is left to set")
         names = [parameter.name for parameter in parameter_list]
         missing = [name for name in names if name not in self._rosz_known]
         if missing:
             raise ParameterNotDeclaredException(missing)
         reasons = [self._rosz_mismatch(parameter) for parameter in parameter_list]
-        reason = next(filter(None, reasons), "") or self._rosz_refusal(list(parameter_list))
+        reason = next(filter(None, reasons), "") or self._rosz_refusal(parameter_list)
         if reason:
             return SetParametersResult(successful=False, reason=reason)
         for parameter in parameter_list:
             self._rosz_set(parameter)
+        self._rosz_tell(parameter_list)
         return SetParametersResult(successful=True)
 
     def _rosz_mismatch(self, parameter: Parameter) -> str:
@@ -387,6 +455,34 @@ class NodeParameters:
     def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
         """Remove a function of `add_on_set_parameters_callback`."""
         self._rosz_checks.remove(callback)
+
+    def add_pre_set_parameters_callback(
+        self, callback: Callable[[list[Parameter]], list[Parameter]]
+    ) -> None:
+        """Call a function that returns which parameters to set instead of given ones."""
+        self._rosz_before.insert(0, callback)
+
+    def remove_pre_set_parameters_callback(
+        self, callback: Callable[[list[Parameter]], list[Parameter]]
+    ) -> None:
+        """Remove a function of `add_pre_set_parameters_callback`."""
+        self._rosz_before.remove(callback)
+
+    def add_post_set_parameters_callback(
+        self, callback: Callable[[list[Parameter]], object]
+    ) -> None:
+        """Call a function with the parameters after they were set."""
+        self._rosz_after.insert(0, callback)
+
+    def remove_post_set_parameters_callback(
+        self, callback: Callable[[list[Parameter]], object]
+    ) -> None:
+        """Remove a function of `add_post_set_parameters_callback`."""
+        self._rosz_after.remove(callback)
+
+    def _rosz_tell(self, parameters: list[Parameter]) -> None:
+        for callback in self._rosz_after:
+            callback(parameters)
 
     def _rosz_refusal(self, parameters: list[Parameter]) -> str:
         """Return why a callback refuses parameters; empty if all accept them."""

@@ -6,10 +6,13 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from rosz.errors import ClosedError, WaitTimeout
 from rosz.ros2.rclpy import arguments
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.ros2.rclpy.executors import Executor, Future, get_global_executor
 from rosz.ros2.rclpy.node import Node
+from rosz.ros2.rclpy.qos import QoSProfile, to_qos
+from rosz.session import LONGEST_WAIT
 
 
 def init(
@@ -98,6 +101,36 @@ def spin_until_future_complete(
         timeout_sec: Time limit in seconds; none when not given.
     """
     _with(node, executor, lambda chosen: chosen.spin_until_future_complete(future, timeout_sec))
+
+
+def wait_for_message(
+    msg_type: type[Any],
+    node: Node,
+    topic: str,
+    *,
+    qos_profile: QoSProfile | int = 1,
+    time_to_wait: float = -1,
+) -> tuple[bool, Any]:
+    """Wait for a message of a topic.
+
+    Args:
+        msg_type: Class of the message.
+        node: Node that subscribes; it need not be spun.
+        topic: Name of the topic.
+        qos_profile: Profile, or depth of the queue.
+        time_to_wait: Time limit in seconds; none if below 0.
+
+    Returns:
+        Whether a message came, and the message; None if the time is over or the context ends.
+    """
+    limit = LONGEST_WAIT if time_to_wait < 0 else time_to_wait
+    subscription = node.rosz_node.subscription(topic, msg_type, qos=to_qos(qos_profile))
+    try:
+        return True, subscription.get(limit)
+    except (WaitTimeout, ClosedError):
+        return False, None
+    finally:
+        subscription.close()
 
 
 def _with(node: Node, executor: Executor | None, act: Callable[[Executor], None]) -> None:

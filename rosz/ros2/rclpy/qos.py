@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from copy import copy
 from enum import Enum, IntEnum
-from typing import Any
+from typing import Any, Self
 
-from rosz.errors import UsageError
+from rosz.errors import RoszError, UsageError
+from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rosz.qos import FOREVER, QoS
 from rosz.ros2.rclpy.time import Duration, Infinite
 
 __all__ = (
     "DurabilityPolicy",
     "HistoryPolicy",
+    "InvalidQosOverridesError",
     "LivelinessPolicy",
     "QoSDurabilityPolicy",
     "QoSHistoryPolicy",
     "QoSLivelinessPolicy",
+    "QoSOverridingOptions",
+    "QoSPolicyKind",
     "QoSPresetProfiles",
     "QoSProfile",
     "QoSReliabilityPolicy",
     "ReliabilityPolicy",
+    "override_qos",
     "qos_profile_action_status_default",
     "qos_profile_parameter_events",
     "qos_profile_parameters",
@@ -81,6 +88,19 @@ _POLICIES: dict[str, tuple[type[IntEnum], IntEnum]] = {
     "liveliness": (LivelinessPolicy, LivelinessPolicy.SYSTEM_DEFAULT),
 }
 _SPANS = ("lifespan", "deadline", "liveliness_lease_duration")
+
+
+class QoSPolicyKind(IntEnum):
+    """The policies of a profile."""
+
+    DURABILITY = 1 << 0
+    DEADLINE = 1 << 1
+    LIVELINESS = 1 << 2
+    RELIABILITY = 1 << 3
+    HISTORY = 1 << 4
+    LIFESPAN = 1 << 5
+    DEPTH = 1 << 6
+    LIVELINESS_LEASE_DURATION = 1 << 7
 
 
 class QoSProfile:
@@ -157,6 +177,93 @@ def to_qos(profile: QoSProfile | int) -> QoS:
         liveliness="manual_by_topic" if manual else "automatic",
         lease=_span(profile.liveliness_lease_duration),
     )
+
+
+class InvalidQosOverridesError(RoszError):
+    """A parameter sets a policy to what it cannot be, or a program refuses the profile."""
+
+
+class QoSOverridingOptions:
+    """The policies of a publisher or subscription that parameters may override.
+
+    Args:
+        policy_kinds: The policies; each becomes the read-only parameter
+            ``qos_overrides.TOPIC.publisher.POLICY`` or ``….subscription.POLICY``.
+        callback: Function that gets the profile, and returns a result that may refuse it.
+        entity_id: Suffix that tells entities of one topic apart.
+    """
+
+    def __init__(
+        self,
+        policy_kinds: Iterable[QoSPolicyKind],
+        *,
+        callback: Callable[[QoSProfile], SetParametersResult] | None = None,
+        entity_id: str | None = None,
+    ) -> None:
+        self.policy_kinds: tuple[QoSPolicyKind, ...] = tuple(policy_kinds)
+        self.callback: Callable[[QoSProfile], SetParametersResult] | None = callback
+        self.entity_id: str | None = entity_id
+
+    @classmethod
+    def with_default_policies(cls, **options: Any) -> Self:
+        """Return options for history, depth and reliability; see the class."""
+        kinds = QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY
+        return cls(kinds, **options)
+
+
+def override_qos(
+    node: Any, kind: str, topic: str, qos: QoSProfile | int, options: QoSOverridingOptions
+) -> QoSProfile:
+    """Declare the parameters of a profile's policies, and return the profile that they make.
+
+    Args:
+        node: Node of rclpy that the entity belongs to.
+        kind: ``publisher`` or ``subscription``.
+        topic: Full name of the topic.
+        qos: Profile, or depth of the queue, that holds without parameters.
+        options: Policies that may be overridden.
+
+    Raises:
+        InvalidQosOverridesError: A value is not one of the policy, or the callback refuses.
+    """
+    profile = QoSProfile(depth=qos) if isinstance(qos, int) else copy(qos)
+    suffix = f"_{options.entity_id}" if options.entity_id is not None else ""
+    for policy in options.policy_kinds:
+        if policy is QoSPolicyKind.LIFESPAN and kind == "subscription":
+            continue
+        name = policy.name.lower()
+        parameter = f"qos_overrides.{topic}.{kind}{suffix}.{name}"
+        if not node.has_parameter(parameter):
+            description = ParameterDescriptor(
+                name=parameter, description=f"{name} of the {kind} of {topic}", read_only=True
+            )
+            node.declare_parameter(parameter, _policy_value(getattr(profile, name)), description)
+        value = node.get_parameter(parameter).value
+        try:
+            setattr(profile, name, _policy(name, value))
+        except KeyError:
+            expected = ", ".join(member.name.lower() for member in _POLICIES[name][0])
+            raise InvalidQosOverridesError(
+                f"parameter '{parameter}' is '{value}'; expected one of {expected}"
+            ) from None
+    if options.callback is not None:
+        result = options.callback(profile)
+        if not result.successful:
+            raise InvalidQosOverridesError(f"the QoS of '{topic}' is refused: {result.reason}")
+    return profile
+
+
+def _policy_value(value: Any) -> Any:
+    """Return a policy as the value of a parameter: a name, a depth, or nanoseconds."""
+    if isinstance(value, Duration):
+        return value.nanoseconds
+    return value.name.lower() if isinstance(value, IntEnum) else value
+
+
+def _policy(name: str, value: Any) -> Any:
+    if name in _SPANS:
+        return Duration(nanoseconds=value)
+    return _POLICIES[name][0][value.upper()] if name in _POLICIES else value
 
 
 def _span(duration: Duration) -> int:
