@@ -178,7 +178,7 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
     "rclpy.impl.rcutils_logger": {"ros2.rclpy.logging": "RcutilsLogger"},
     "rclpy.parameter": {
         "ros2.rclpy.parameter": "PARAMETER_SEPARATOR_STRING Parameter get_parameter_value"
-        " parameter_dict_from_yaml_file",
+        " parameter_dict_from_yaml_file parameter_value_to_python",
     },
     "rclpy.publisher": {"ros2.rclpy.entities": "Publisher"},
     "rclpy.qos_event": {
@@ -370,6 +370,7 @@ MODULES: Mapping[str, Module] = {
     "rosgraph.impl.graph": Module("ros1.tools.rosgraph.graph"),
     "rospy.exceptions": Module("ros1.exceptions"),
     "sensor_msgs.point_cloud2": Module("ros1.client.point_cloud2"),
+    "sensor_msgs_py": Module("ros2.sensor_msgs_py", extras=_NUMPY),
     "tf_transformations": Module("ros1.client.tf.transformations"),
     **{name: Module(names=names) for name, names in _BUILT.items()},
 }

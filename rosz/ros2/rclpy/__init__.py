@@ -1,9 +1,8 @@
 """rclpy: the part of ROS 2's Python interface that tutorials and simple nodes use.
 
-Callbacks run while an executor spins, on its thread. Lifecycle nodes, guard conditions, waitables
-and event handlers are missing: using them raises an ``AttributeError`` or
-``ModuleNotFoundError`` with their name. Submodules of rclpy that share a file here
-(``rclpy.publisher``, ``rclpy.duration``, …) are listed in ``rosz.ros1.modules``.
+Callbacks run while an executor spins, on its thread. Waitables and the events of deadlines and
+liveliness are missing: using them raises an error with their name. Submodules of rclpy that share a
+file here (``rclpy.publisher``, ``rclpy.duration``, …) are listed in ``rosz.ros1.modules``.
 """
 
 from rosz.ros2.rclpy import context, exceptions, executors, logging, node, parameter, qos, time

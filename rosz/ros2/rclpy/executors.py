@@ -8,11 +8,14 @@ before it collects again, so that no entity starves.
 from __future__ import annotations
 
 import inspect
+import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple, Protocol, Self
 
 from rosz.errors import RoszError
@@ -174,10 +177,38 @@ class Future:
         else:
             self._executor.call_soon(lambda: callback(self))
 
-    def __await__(self) -> Generator[Future, None, Any]:
+    def __await__(self) -> Generator[Any, None, Any]:
         while not self.done():
-            yield self
+            loop = None if getattr(_stepping, "task", None) else _asyncio_loop()
+            if loop is None:
+                yield self  # to `Task.step`
+            else:
+                waiter = loop.create_future()
+                self.add_done_callback(partial(_wake_waiter, loop, waiter))
+                yield from waiter
         return self.result()
+
+
+_stepping = threading.local()
+"""The task that each thread steps; a coroutine without one is awaited by asyncio."""
+
+
+def _asyncio_loop() -> Any:
+    """Return the loop of asyncio that runs on this thread; None if there is none."""
+    asyncio = sys.modules.get("asyncio")
+    try:
+        return None if asyncio is None else asyncio.get_running_loop()
+    except RuntimeError:
+        return None
+
+
+def _wake_waiter(loop: Any, waiter: Any, _: Future) -> None:
+    def wake() -> None:
+        if not waiter.done():
+            waiter.set_result(None)
+
+    with suppress(RuntimeError):  # the loop is closed: nobody waits
+        loop.call_soon_threadsafe(wake)
 
 
 class Task(Future):
@@ -213,7 +244,11 @@ class Task(Future):
                     self.set_result(result)
                     return
                 self._coroutine = result
-            awaited = self._coroutine.send(None)
+            _stepping.task = self
+            try:
+                awaited = self._coroutine.send(None)
+            finally:
+                _stepping.task = None
         except StopIteration as stop:
             self.set_result(stop.value)
         except BaseException as error:

@@ -27,6 +27,7 @@ from rosz.ros2.rclpy.executors import (
 )
 from rosz.ros2.rclpy.logging import RcutilsLogger, serve_logger_levels, write_as_rclpy
 from rosz.ros2.rclpy.parameter import NodeParameters, Parameter
+from rosz.ros2.rclpy.parameter_service import DeclaredParameters
 from rosz.ros2.rclpy.qos import QoSOverridingOptions, QoSProfile, override_qos, to_qos
 from rosz.ros2.rclpy.time import Clock, Rate, ROSClock
 from rosz.wire import Kind, Token
@@ -81,6 +82,7 @@ class Node(NodeParameters):
             overrides |= given.params.get(name, {})
         overrides |= {parameter.name: parameter.value for parameter in parameter_overrides or ()}
         super().__init__(node, overrides, self.rosz_call_soon)
+        node.ros2_parameters = DeclaredParameters(self, self.rosz_call_soon)
         self._clock = ROSClock(self.rosz_node.clock)
         self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
         write_as_rclpy(self.rosz_node.log, self._rosz_logger_name)
@@ -186,7 +188,7 @@ class Node(NodeParameters):
         self,
         msg_type: type[Any],
         topic: str,
-        callback: Callable[[Any], Any],
+        callback: Callable[..., Any],
         qos_profile: QoSProfile | int,
         *,
         callback_group: CallbackGroup | None = None,

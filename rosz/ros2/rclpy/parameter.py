@@ -38,6 +38,7 @@ __all__ = (
     "Parameter",
     "get_parameter_value",
     "parameter_dict_from_yaml_file",
+    "parameter_value_to_python",
 )
 
 PARAMETER_SEPARATOR_STRING = "."
@@ -129,10 +130,7 @@ class Parameter:
     def from_parameter_msg(cls, param_msg: ParameterMessage) -> Parameter:
         """Return the parameter of a message."""
         kind = cls.Type(param_msg.value.type)
-        value = None if kind is _Type.NOT_SET else getattr(param_msg.value, _field(kind))
-        if isinstance(value, array.array):
-            value = value.tolist()
-        return cls(param_msg.name, kind, value)
+        return cls(param_msg.name, kind, parameter_value_to_python(param_msg.value))
 
     def __repr__(self) -> str:
         return f"Parameter(name={self._name!r}, type_={self._type.name}, value={self._value!r})"
@@ -195,6 +193,13 @@ def get_parameter_value(string_value: str) -> ParameterValue:
     """Return the parameter value of a text, by the rules of YAML."""
     value = next(read_plain(string_value, "<value>"), None)
     return Parameter("", value=value).get_parameter_value()
+
+
+def parameter_value_to_python(parameter_value: ParameterValue) -> Any:
+    """Return the value of a message; None if it is not set."""
+    kind = Parameter.Type(parameter_value.type)
+    value = None if kind is _Type.NOT_SET else getattr(parameter_value, _field(kind))
+    return value.tolist() if isinstance(value, array.array) else value
 
 
 def parameter_dict_from_yaml_file(
@@ -338,8 +343,10 @@ class NodeParameters:
 
     def _rosz_set(self, parameter: Parameter) -> None:
         self._rosz_known[parameter.name] = parameter
-        if parameter.type_ is not _Type.NOT_SET:
-            self.rosz_node.params.set(_path(parameter.name), parameter.value)
+        params, path = self.rosz_node.params, _path(parameter.name)
+        kept = parameter.type_ is _Type.NOT_SET or params.get(path, _MISSING) == parameter.value
+        if not kept:
+            params.set(path, parameter.value)
 
     def _rosz_update(self, name: str) -> None:
         """Apply the value that another program has set."""
@@ -350,13 +357,18 @@ class NodeParameters:
         try:
             changed = _convert(name, value, parameter.type_)
         except InvalidParameterTypeException as error:
-            self.rosz_node.log.warning("%s; it stays %r", error, parameter.value)
+            self._rosz_refuse(parameter, str(error))
             return
         result = self.set_parameters_atomically([changed])
         if not result.successful:
-            self.rosz_node.log.warning(
-                "parameter '%s' stays %r: %s", name, parameter.value, result.reason
-            )
+            self._rosz_refuse(parameter, result.reason)
+
+    def _rosz_refuse(self, parameter: Parameter, reason: str) -> None:
+        """Put the value of the node back into the store, which has got another one."""
+        self.rosz_node.log.warning(
+            "parameter '%s' stays %r: %s", parameter.name, parameter.value, reason
+        )
+        self._rosz_set(parameter)
 
     def undeclare_parameter(self, name: str) -> None:
         """Remove the declaration of a parameter."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -32,47 +32,7 @@ from rosz.ros2.rclpy.parameter import Parameter
 from rosz.ros2.rclpy.qos import DurabilityPolicy, QoSProfile
 from rosz.ros2.rclpy.time import ClockType, Duration
 
-Start = Callable[..., Context]
-
-
-@pytest.fixture
-def start(network: Network, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
-    """Return a function that opens contexts on the network of the test."""
-    for name, value in network.variables().items():
-        monkeypatch.setenv(name, value)
-    opened: list[Context] = []
-
-    def begin(*args: str) -> Context:
-        context = Context()
-        context.init(["program", *args])
-        opened.append(context)
-        return context
-
-    yield begin
-    for context in opened:
-        context.shutdown()
-
-
-class World:
-    """A node and its executor."""
-
-    def __init__(self, start: Start, name: str = "robot", *args: str, **options: Any) -> None:
-        self.context = start(*args)
-        self.node = Node(name, context=self.context, **options)
-        self.executor = executors.SingleThreadedExecutor(context=self.context)
-        self.executor.add_node(self.node)
-
-    def spin_until(self, condition: Callable[[], object], what: str) -> None:
-        def look() -> object:
-            self.executor.spin_once(timeout_sec=0.01)
-            return condition()
-
-        eventually(look, what)
-
-
-@pytest.fixture
-def world(start: Start) -> World:
-    return World(start)
+from .conftest import Start, World
 
 
 def test_messages_are_handled_while_spinning_and_on_its_thread(world: World) -> None:
@@ -112,7 +72,7 @@ def test_a_full_queue_keeps_the_newest_messages(world: World) -> None:
 
 
 def _last(messages: Any) -> Any:
-    return messages[-1].data if messages else None
+    return messages[-1][0].data if messages else None
 
 
 def test_transient_local_reaches_late_subscriptions(world: World) -> None:
@@ -380,8 +340,8 @@ def test_names_and_clock(start: Start) -> None:
 
 
 def test_missing_attributes_are_named(world: World) -> None:
-    with pytest.raises(AttributeError, match="create_guard_condition"):
-        _ = world.node.create_guard_condition
+    with pytest.raises(AttributeError, match="add_waitable"):
+        _ = world.node.add_waitable
     assert not hasattr(world.node, "my_own")
 
 
@@ -461,3 +421,29 @@ def test_tasks(world: World) -> None:
     task = world.executor.create_task(second)
     world.executor.spin_until_future_complete(task, timeout_sec=TIMEOUT)
     assert (first.result(), task.result()) == (3, 30)
+
+
+def test_asyncio_awaits_futures(world: World) -> None:
+    """A coroutine of asyncio awaits what callbacks and coroutines of the executor complete."""
+    done, inner = Future(), Future()
+
+    async def spun() -> str:
+        return str(await inner)
+
+    async def main() -> list[str]:
+        task = world.executor.create_task(spun)
+        guard = world.node.create_guard_condition(lambda: inner.set_result("inner"))
+
+        async def spin() -> None:
+            while True:
+                world.executor.spin_once(timeout_sec=0)
+                await asyncio.sleep(0)
+
+        spinning = asyncio.create_task(spin())
+        guard.trigger()
+        world.executor.call_soon(lambda: done.set_result("done"))
+        results = [await done, await task]
+        spinning.cancel()
+        return results
+
+    assert asyncio.run(asyncio.wait_for(main(), TIMEOUT)) == ["done", "inner"]
