@@ -189,10 +189,12 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         "ros2.rclpy.qos": "InvalidQosOverridesError QoSOverridingOptions"
         " QosCallbackResult=SetParametersResult",
     },
+    "rclpy.serialization": {"ros2.rclpy.program": "deserialize_message serialize_message"},
     "rclpy.service": {"ros2.rclpy.entities": "Service"},
+    "rclpy.signals": {"ros2.rclpy.program": "SignalHandlerOptions"},
     "rclpy.subscription": {"ros2.rclpy.entities": "Subscription"},
     "rclpy.task": {"ros2.rclpy.executors": "Future Task"},
-    "rclpy.time": {"ros2.rclpy.time": "CONVERSION_CONSTANT ClockType Time"},
+    "rclpy.time": {"ros2.rclpy.time": "CONVERSION_CONSTANT ClockType Duration Time"},
     "rclpy.timer": {"ros2.rclpy.entities": "Timer", "ros2.rclpy.time": "Rate"},
     "rclpy.utilities": {
         "ros2.rclpy.program": "get_default_context get_rmw_implementation_identifier ok"

@@ -11,17 +11,15 @@ from rosz.lazy import exports_of
 
 TYPE_CHECKING = False  # typing takes long to import
 if TYPE_CHECKING:
-    from rosz.node.ros2.parameters import Ros2Parameters
     from rosz.node.ros2.types import request_action, request_definition, request_type
     from rosz.node.ros2.values import to_ros2
 else:
     __getattr__ = exports_of(
         __name__,
         {
-            "parameters": "Ros2Parameters",
             "types": "request_action request_definition request_type",
             "values": "to_ros2",
         },
     )
 
-__all__ = ("Ros2Parameters", "request_action", "request_definition", "request_type", "to_ros2")
+__all__ = ("request_action", "request_definition", "request_type", "to_ros2")

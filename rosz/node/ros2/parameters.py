@@ -127,7 +127,7 @@ class Ros2Parameters:
         replica = self._node.context.params
         replica.write(condense(changes), origin=f"{self._node.name} for ROS 2 ({replica.label})")
 
-    def _all(self) -> Mapping[str, Value]:
+    def _all(self) -> dict[str, Value]:
         """Return the values by name, with ``use_sim_time``, which every node of ROS 2 has."""
         values = {name: value for name, (_, value) in self.values().items()}
         if self._node.parameter_owner is not None:
@@ -201,7 +201,7 @@ class Ros2ParameterServices:
     def __init__(self, node: NodeCore) -> None:
         self.node = node
         self.services: dict[str, _SharedService] = {}
-        self._parameters: Ros2Parameters = node.ros2_parameters or Ros2Parameters(node)
+        self._parameters = Ros2Parameters(node)
         self._lifecycle = Lifecycle("the parameter services", log=node.log)
         try:
             self._declare()

@@ -13,7 +13,9 @@ from rosz.ros2.rclpy import time as clock
 from rosz.ros2.rclpy import time as duration
 from rosz.ros2.rclpy.context import get_default_context
 from rosz.ros2.rclpy.executors import Future, get_global_executor
+from rosz.ros2.rclpy.parameter import Parameter
 from rosz.ros2.rclpy.program import (
+    SignalHandlerOptions,
     create_node,
     init,
     ok,
@@ -26,6 +28,8 @@ from rosz.ros2.rclpy.program import (
 
 __all__ = (
     "Future",
+    "Parameter",
+    "SignalHandlerOptions",
     "callback_groups",
     "clock",
     "context",

@@ -15,6 +15,7 @@ from rosz.ros2.rclpy.events import (
     GuardCondition,
     PublisherEventCallbacks,
     SubscriptionEventCallbacks,
+    UnsupportedEventTypeError,
     handlers_of,
 )
 from rosz.ros2.rclpy.exceptions import NotInitializedException
@@ -27,7 +28,6 @@ from rosz.ros2.rclpy.executors import (
 )
 from rosz.ros2.rclpy.logging import RcutilsLogger, serve_logger_levels, write_as_rclpy
 from rosz.ros2.rclpy.parameter import NodeParameters, Parameter
-from rosz.ros2.rclpy.parameter_service import DeclaredParameters
 from rosz.ros2.rclpy.qos import QoSOverridingOptions, QoSProfile, override_qos, to_qos
 from rosz.ros2.rclpy.time import Clock, Rate, ROSClock
 from rosz.wire import Kind, Token
@@ -82,7 +82,6 @@ class Node(NodeParameters):
             overrides |= given.params.get(name, {})
         overrides |= {parameter.name: parameter.value for parameter in parameter_overrides or ()}
         super().__init__(node, overrides, self.rosz_call_soon)
-        node.ros2_parameters = DeclaredParameters(self, self.rosz_call_soon)
         self._clock = ROSClock(self.rosz_node.clock)
         self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
         write_as_rclpy(self.rosz_node.log, self._rosz_logger_name)
@@ -174,7 +173,11 @@ class Node(NodeParameters):
         qos_profile = self._rosz_qos("publisher", topic, qos_profile, qos_overriding_options)
         raw = self.rosz_node.publisher(topic, msg_type, qos=to_qos(qos_profile))
         group = callback_group or self.default_callback_group
-        events = handlers_of(raw, event_callbacks, group, self.rosz_wake)
+        try:
+            events = handlers_of(raw, event_callbacks, group, self.rosz_wake)
+        except UnsupportedEventTypeError:
+            raw.close()
+            raise
         return self.rosz_add(publisher_class(raw, qos_profile, events))
 
     def _rosz_qos(
@@ -214,19 +217,22 @@ class Node(NodeParameters):
             InvalidQosOverridesError: A parameter has no valid policy.
         """
         qos_profile = self._rosz_qos("subscription", topic, qos_profile, qos_overriding_options)
-        return self.rosz_add(
-            Subscription(
-                self.rosz_node,
-                topic,
-                msg_type,
-                callback,
-                to_qos(qos_profile),
-                raw=raw,
-                group=callback_group or self.default_callback_group,
-                wake=self.rosz_wake,
-                events=event_callbacks,
-            )
+        subscription = Subscription(
+            self.rosz_node,
+            topic,
+            msg_type,
+            callback,
+            to_qos(qos_profile),
+            raw=raw,
+            group=callback_group or self.default_callback_group,
+            wake=self.rosz_wake,
         )
+        try:
+            subscription.follow(event_callbacks)
+        except UnsupportedEventTypeError:
+            subscription.destroy()
+            raise
+        return self.rosz_add(subscription)
 
     def create_timer(
         self,

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any
+from enum import IntEnum
+from typing import Any, TypeVar
 
 from rosz.errors import ClosedError, WaitTimeout
+from rosz.message import Message
 from rosz.ros2.rclpy import arguments
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.ros2.rclpy.executors import Executor, Future, get_global_executor
 from rosz.ros2.rclpy.node import Node
 from rosz.ros2.rclpy.qos import QoSProfile, to_qos
 from rosz.session import LONGEST_WAIT
+
+M = TypeVar("M", bound=Message)
+
+
+class SignalHandlerOptions(IntEnum):
+    """The signals for which rclpy installs handlers; for information only."""
+
+    NO = 0
+    SIGINT = 1
+    SIGTERM = 2
+    ALL = 3
 
 
 def init(
@@ -131,6 +144,24 @@ def wait_for_message(
         return False, None
     finally:
         subscription.close()
+
+
+def serialize_message(message: Message) -> bytes:
+    """Return the CDR bytes of a message.
+
+    Raises:
+        EncodeError: A field has a value that does not fit.
+    """
+    return message.to_cdr()
+
+
+def deserialize_message(serialized_message: bytes, message_type: type[M]) -> M:
+    """Return the message of CDR bytes.
+
+    Raises:
+        DecodeError: The bytes are not those of such a message.
+    """
+    return message_type.from_cdr(serialized_message)
 
 
 def _with(node: Node, executor: Executor | None, act: Callable[[Executor], None]) -> None:

@@ -202,7 +202,7 @@ def test_missing_modules_are_named(network: Network) -> None:
         import rosz.ros1
         import rclpy
         try:
-            import rclpy.signals
+            import rclpy.waitable
         except ModuleNotFoundError as error:
             print(error)
         try:
@@ -212,5 +212,5 @@ def test_missing_modules_are_named(network: Network) -> None:
         """
     )
     assert program.exit_code() == 0
-    assert "rclpy.signals" in program.lines[0]
+    assert "rclpy.waitable" in program.lines[0]
     assert "create_waitable" in program.lines[1]

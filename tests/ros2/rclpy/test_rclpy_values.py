@@ -6,16 +6,26 @@ from pathlib import Path
 
 import pytest
 
-from rosz.errors import NotFoundError, UsageError, YamlError
+from rosz.errors import DecodeError, NotFoundError, UsageError, YamlError
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
+from rosz.msgs.std_msgs.msg import String
 from rosz.qos import QoS
-from rosz.ros2.rclpy import qos
+from rosz.ros2.rclpy import program, qos
 from rosz.ros2.rclpy.arguments import parse, remove_ros_args
 from rosz.ros2.rclpy.parameter import Parameter, get_parameter_value
 from rosz.ros2.rclpy.time import ClockType, Duration, Infinite, Time
 
 Type = Parameter.Type
+
+
+def test_serialized_messages() -> None:
+    message = String(data="text")
+    data = program.serialize_message(message)
+    assert data[:4] == b"\x00\x01\x00\x00"
+    assert program.deserialize_message(data, String) == message
+    with pytest.raises(DecodeError):
+        program.deserialize_message(data[:6], String)
 
 
 def test_durations() -> None:
