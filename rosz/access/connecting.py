@@ -19,7 +19,7 @@ _LOCAL = "localhost"
 _FREE_GUESSES = 5
 _LONGEST_PAUSE = 60.0
 _FORGET_SECONDS = 900.0
-_MOST_ADDRESSES = 10_000
+_MOST_NETWORKS = 10_000
 
 
 def is_loopback(host: str) -> bool:
@@ -38,7 +38,10 @@ def is_password(given: str, password: str) -> bool:
 
 
 class PasswordGuesses:
-    """Slows those down who guess a password: each wrong one of an address doubles the pause.
+    """Slows those down who guess a password: each wrong one of a network doubles the pause.
+
+    The network is an address of IPv4, or the /64 of an address of IPv6, since a host has all of
+    that and may use another address for each guess.
 
     A few are free, since people mistype. In the pause the right one is refused, too: an answer
     would tell it from wrong ones.
@@ -51,7 +54,7 @@ class PasswordGuesses:
         self._clock = clock
         self._lock = threading.Lock()
         self._wrong: dict[str, tuple[int, float]] = {}
-        """Number of wrong passwords and end of the pause, by address, in the order of use."""
+        """Number of wrong passwords and end of the pause, by network, in the order of use."""
 
     def pause(self, address: str, right: bool) -> float:
         """Count a password, and return the seconds for which it is refused, or 0.
@@ -60,20 +63,34 @@ class PasswordGuesses:
             address: Address that it comes from.
             right: Whether it is the right one.
         """
+        network = _network_of(address)
         with self._lock:
             now = self._clock()
-            count, until = self._wrong.get(address, (0, 0.0))
+            count, until = self._wrong.get(network, (0, 0.0))
             if now < until:
                 return until - now
-            self._wrong.pop(address, None)
+            self._wrong.pop(network, None)
             if not right:
                 count = 1 if now > until + _FORGET_SECONDS else count + 1
                 doubled = 2.0 ** min(count - _FREE_GUESSES, 10)
                 pause = min(doubled, _LONGEST_PAUSE) if count >= _FREE_GUESSES else 0.0
-                self._wrong[address] = count, now + pause
-                if len(self._wrong) > _MOST_ADDRESSES:
+                self._wrong[network] = count, now + pause
+                if len(self._wrong) > _MOST_NETWORKS:
                     del self._wrong[next(iter(self._wrong))]
             return 0.0
+
+
+def _network_of(address: str) -> str:
+    """Return the network whose wrong passwords count together; other texts are unchanged."""
+    try:
+        parsed = ipaddress.ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if not isinstance(parsed, ipaddress.IPv6Address):
+        return address
+    if parsed.ipv4_mapped is not None:
+        return str(parsed.ipv4_mapped)
+    return str(ipaddress.ip_network((int(parsed) >> 64 << 64, 64)))
 
 
 def password_in(path: str, headers: Mapping[str, str]) -> str:

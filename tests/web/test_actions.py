@@ -162,6 +162,43 @@ def test_a_page_publishes_once_and_at_a_rate(network: Network) -> None:
     assert not sending.repeats
 
 
+def test_a_repetition_replaces_the_one_before(network: Network) -> None:
+    waiting: list[Any] = []
+
+    class Turns:
+        """A worker whose items wait until the test runs them."""
+
+        def submit(self, task: Any) -> None:
+            waiting.append(task)
+
+        def later(self, _seconds: float, task: Any) -> None:
+            waiting.append(task)
+
+        def close(self) -> None:
+            waiting.clear()
+
+    def run() -> None:
+        due = waiting.copy()
+        waiting.clear()
+        for task in due:
+            task()
+
+    sending = Sending(network.node("page"), PagePolicy(), "/cmd_vel", "geometry_msgs/Twist")
+    sending._worker.close()
+    sending._worker = Turns()  # type: ignore[assignment]
+    sending.repeat("linear: {x: 1}", 1)
+    run()
+    sending.stop()
+    sending.repeat("linear: {x: 2}", 1)
+    sending.repeat("linear: {x: 3}", 1)
+    run()
+    assert sending.sent == 2
+    run()
+    assert sending.sent == 3
+    assert len(waiting) == 1
+    sending.close()
+
+
 def test_driving_ends_when_the_browser_is_silent(network: Network) -> None:
     robot, page = network.node("robot"), network.node("page")
     got: list[float] = []

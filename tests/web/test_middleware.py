@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import MutableMapping
 from typing import Any
 
@@ -203,3 +204,18 @@ def test_the_pauses_of_guesses() -> None:
     for number in range(20_000):
         guesses.pause(str(number), False)
     assert len(guesses._wrong) == 10_000
+
+
+@pytest.mark.parametrize(
+    ("addresses", "other"),
+    [
+        ("2001:db8::1 2001:db8:0:0:ffff::9 2001:db8::a%eth0", "2001:db8:0:1::1"),
+        ("192.0.2.7 ::ffff:192.0.2.7", "192.0.2.8"),
+    ],
+)
+def test_guesses_of_a_network_count_together(addresses: str, other: str) -> None:
+    guesses = PasswordGuesses(lambda: 100.0)
+    for address in itertools.islice(itertools.cycle(addresses.split()), 5):
+        assert guesses.pause(address, False) == 0
+    assert all(guesses.pause(address, True) for address in addresses.split())
+    assert guesses.pause(other, True) == 0

@@ -139,6 +139,7 @@ class TopicRelay:
     Args:
         qos: The QoS of the subscription for which the samples pass.
         rate: Largest number of samples per second of each publisher; infinity for no limit.
+            Samples without a legible attachment count as those of one publisher.
     """
 
     def __init__(
@@ -172,8 +173,18 @@ class TopicRelay:
 
     def _pass(self, sample: Sample) -> None:
         attachment = self._edit.attachment(sample)
-        if self._period and not (attachment := self._limit(attachment)):
-            return
+        if self._period:
+            try:
+                sequence, published, gid = read_attachment(attachment)
+            except DecodeError:  # a plain Zenoh program sent it
+                if not self._is_due(b""):
+                    return
+            else:
+                if not self._is_due(gid):
+                    return
+                # Numbers without gaps: the samples that the limit drops are not lost ones.
+                self._sent[gid] = number = self._sent.get(gid, sequence - 1) + 1
+                attachment = pack_attachment(number, published, gid)
         try:
             self._publisher.forward(sample, self._edit.payload(sample), attachment)
         except ClosedError:
@@ -183,25 +194,18 @@ class TopicRelay:
                 self._damaged = True
                 log.warning("dropping damaged samples on '%s' (told once): %s", self._key, error)
 
-    def _limit(self, attachment: bytes | None) -> bytes | None:
-        """Return the attachment of a sample that is due, renumbered without gaps; else None.
-
-        An attachment that cannot be read is returned unchanged.
-        """
-        try:
-            sequence, published, gid = read_attachment(attachment)
-        except DecodeError:
-            return attachment
+    def _is_due(self, gid: bytes) -> bool:
+        """Return whether the rate lets a sample of a publisher pass now."""
         now, due = time.monotonic(), self._due.get(gid, 0.0)
         if now < due:
-            return None
+            return False
         # A sample that is late by less than a period does not delay the samples after it.
         self._due[gid] = (due if now - due < self._period else now) + self._period
-        self._sent[gid] = number = self._sent.get(gid, sequence - 1) + 1
         while len(self._due) > _DEEPEST:
             oldest = next(iter(self._due))
-            del self._due[oldest], self._sent[oldest]
-        return pack_attachment(number, published, gid)
+            del self._due[oldest]
+            self._sent.pop(oldest, None)
+        return True
 
     def close(self) -> None:
         """Stop passing samples; a second call has no effect."""

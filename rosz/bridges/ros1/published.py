@@ -45,6 +45,8 @@ class PublishedTopic(Handler):
         self._closed = False
         self._delay = _FIRST_RETRY
         self._reported = ""
+        """Why the node could not be connected to; empty once it could."""
+        self._damage = ""
         self._received = 0
         self._reader = FrameReader(MAX_FRAME)
         try:
@@ -189,7 +191,7 @@ class PublishedTopic(Handler):
         latched = header.get("latching") == "1"
         if publisher is None or (latched and not publisher.qos.latched):
             self._declare(latched=latched)
-        self._delay, self._reported = _FIRST_RETRY, ""
+        self._delay, self._reported, self._damage = _FIRST_RETRY, "", ""
         self._reader = FrameReader(MAX_FRAME)
         self._stream = Stream(self._shared.loop, sock, self)
 
@@ -250,8 +252,8 @@ class PublishedTopic(Handler):
             except ClosedError:
                 return
             except MessageError as error:
-                if str(error) != self._reported:
-                    self._reported = str(error)
+                if str(error) != self._damage:
+                    self._damage = str(error)
                     log.warning(
                         "dropping a damaged message on '%s' from node '%s' (told once): %.300s",
                         self.entry.name,

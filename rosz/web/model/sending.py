@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from functools import partial
 from typing import Any
 
 from rosz.access import PagePolicy
@@ -50,6 +51,7 @@ class Sending:
         self._message: Any = None
         self._period = 0.0
         self._due = 0.0
+        self._repeats = 0
         self.sent: int = 0
 
     @property
@@ -66,28 +68,28 @@ class Sending:
         """Publish a message at a rate in hertz; errors are those of `read_form`."""
         message = read_form(self._cls, text, self._node.now())
         with self._lock:
-            was_repeating, self._message = self._message is not None, message
-            self._period = 1 / rate
-            self._due = time.monotonic()
-        if not was_repeating:
-            self._worker.submit(self._turn)
+            self._message, self._period, self._due = message, 1 / rate, time.monotonic()
+            self._repeats += 1
+            turn = partial(self._turn, self._repeats)
+        self._worker.submit(turn)
 
     def stop(self) -> None:
         """Stop publishing at a rate."""
         with self._lock:
             self._message = None
 
-    def _turn(self) -> None:
+    def _turn(self, repeat: int) -> None:
         with self._lock:
             message = self._message
-            if message is None:
+            # A turn of an earlier call of `repeat` may still be waiting for its time.
+            if message is None or repeat != self._repeats:
                 return
             # Missed turns are dropped, so that no burst follows a late turn.
             self._due = max(self._due + self._period, time.monotonic())
             wait = self._due - time.monotonic()
         self._publisher.publish(message)
         self.sent += 1
-        self._worker.later(wait, self._turn)
+        self._worker.later(wait, partial(self._turn, repeat))
 
     def close(self) -> None:
         """Stop publishing, and close the publisher."""

@@ -1,11 +1,17 @@
-"""The ids of publishers in what passes from one session to another."""
+"""What passes from one session to another: the ids of publishers, and limits of rates."""
 
 from __future__ import annotations
 
 import time
 from threading import Timer
+from types import SimpleNamespace
+from typing import Any
 
-from rosz.bridges.fleet.relays import Ids
+import pytest
+
+from rosz.bridges.fleet.relays import Edit, Ids, TopicRelay
+from rosz.qos import QoS
+from rosz.wire import pack_attachment
 
 HERE, THERE = bytes(16), bytes(range(16))
 
@@ -34,3 +40,47 @@ def test_only_the_first_sample_of_a_publisher_without_token_waits() -> None:
     for _ in range(1000):
         assert ids.find(HERE) is None
     assert time.monotonic() - began < 100  # 2000 s if each waited
+
+
+class Wire:
+    """A session: what it sends is kept, and nothing arrives."""
+
+    def __init__(self) -> None:
+        self.sent: list[bytes | None] = []
+
+    def publisher(self, _key: str, **_options: Any) -> Any:
+        return self
+
+    def pull_subscriber(self, *_words: Any, **_options: Any) -> Any:
+        return self
+
+    def receive(self) -> None:
+        return None
+
+    def forward(self, _sample: Any, _payload: Any, attachment: bytes | None) -> None:
+        self.sent.append(attachment)
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("attachment", [None, b"what another program sends"])
+def test_a_limit_lets_samples_without_attachment_pass(
+    attachment: bytes | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 100.0
+    clock = SimpleNamespace(monotonic=lambda: now)
+    monkeypatch.setattr("rosz.bridges.fleet.relays.time", clock)
+    wire: Any = Wire()
+    relay = TopicRelay(wire, "a", wire, "b", qos=QoS(), rate=2, edit=Edit(Ids()))
+    sample: Any = SimpleNamespace(attachment=attachment)
+    for _ in range(8):  # two seconds of four samples each
+        relay._pass(sample)
+        now += 0.25
+    assert wire.sent == [attachment] * 4
+    numbered: Any = SimpleNamespace(attachment=pack_attachment(7, 0, HERE))
+    for _ in range(4):
+        relay._pass(numbered)
+        now += 0.25
+    assert wire.sent[4:] == [pack_attachment(number, 0, HERE) for number in (7, 8)]
+    relay.close()

@@ -612,6 +612,36 @@ def test_a_connection_stands_for_a_node_that_is_there(world: World, node: Node) 
         server.shutdown()
 
 
+def test_a_damaged_message_is_no_refused_connection(world: World, node: Node) -> None:
+    """First messages of others wait for the next connection as for the first one."""
+
+    class Answering(SimpleXMLRPCServer):
+        def _dispatch(self, _method: str, _params: Any) -> Any:
+            return [1, "", ["TCPROS", "127.0.0.1", listener.getsockname()[1]]]
+
+    with (
+        socket.create_server(("127.0.0.1", 0)) as listener,
+        Answering(("127.0.0.1", 0), logRequests=False) as server,
+    ):
+        listener.settimeout(TIMEOUT)
+        world.network.thread(server.serve_forever)
+        uri = f"http://127.0.0.1:{server.server_address[1]}/"
+        node.subscription("/damaged", String, print)
+        registered = ("/damaging", "/damaged", "std_msgs/String", uri)
+        assert world.call("registerPublisher", *registered)[0] == 1
+        with listener.accept()[0] as sock:
+            part: Any = world.bridge._mirror._parts["publisher", "/damaged", "/damaging"]
+            assert part.is_connecting
+            sock.sendall(encode_header({"type": String._type, "md5sum": String._md5sum}))
+            sock.sendall(struct.pack("<II", 4, 100))  # a text of 100 bytes that are not there
+            eventually(lambda: part._damage, "the damaged message")
+            assert not part.is_connecting
+        with listener.accept()[0]:
+            assert part.is_connecting
+            world.call("unregisterPublisher", "/damaging", "/damaged", uri)
+        server.shutdown()
+
+
 def test_a_node_that_comes_again_has_its_tokens_again(world: World, node: Node) -> None:
     """Zenoh keeps memory for each key that a token ever had."""
     names = ("/again/get_loggers", "/again/set_logger_level")
