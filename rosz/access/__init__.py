@@ -15,19 +15,3 @@ from rosz.access.connecting import (
 )
 from rosz.access.policy import AccessPolicy, NamePattern, PagePolicy, Verb, matches_any
 from rosz.access.server import ServerAccess, ServerSettings, open_access
-
-__all__ = (
-    "AccessPolicy",
-    "NamePattern",
-    "PagePolicy",
-    "PasswordGuesses",
-    "ServerAccess",
-    "ServerSettings",
-    "Verb",
-    "is_loopback",
-    "is_password",
-    "matches_any",
-    "open_access",
-    "origin_objection",
-    "page_objection",
-)

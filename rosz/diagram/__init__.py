@@ -6,16 +6,3 @@ DOT or Mermaid.
 
 from rosz.diagram.drawing import labels_of, write_dot, write_mermaid, write_svg
 from rosz.diagram.picture import CONTENTS, Box, Content, Picture, PictureOptions, make_picture
-
-__all__ = (
-    "CONTENTS",
-    "Box",
-    "Content",
-    "Picture",
-    "PictureOptions",
-    "labels_of",
-    "make_picture",
-    "write_dot",
-    "write_mermaid",
-    "write_svg",
-)

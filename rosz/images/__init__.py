@@ -8,16 +8,3 @@ from __future__ import annotations
 from rosz.images.arrays import convert, image_array, saturated, without_channel
 from rosz.images.encodings import Encoding, ImageError, depth_of, parse_encoding, type_of
 from rosz.images.pictures import pixels
-
-__all__ = (
-    "Encoding",
-    "ImageError",
-    "convert",
-    "depth_of",
-    "image_array",
-    "parse_encoding",
-    "pixels",
-    "saturated",
-    "type_of",
-    "without_channel",
-)

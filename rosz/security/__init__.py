@@ -37,25 +37,3 @@ else:
             "zenoh_rules": "access_control",
         },
     )
-
-__all__ = (
-    "CERTIFICATE",
-    "EVERYTHING",
-    "Authority",
-    "KeyFolder",
-    "KeyWatch",
-    "LocalPermissions",
-    "PatternReader",
-    "Permit",
-    "Rules",
-    "access_control",
-    "certificate_names",
-    "compose",
-    "is_pattern",
-    "matches",
-    "read_rules",
-    "read_trusted",
-    "refusal",
-    "review_keys",
-    "wants_keys",
-)

@@ -14,6 +14,7 @@ __all__ = (
     "SOURCE",
     "Import",
     "assigned_names",
+    "exports",
     "floor",
     "imports",
     "is_package",
@@ -155,7 +156,7 @@ def imports(module: str) -> Iterator[Import]:
             assert node.module is not None
             for alias in node.names:
                 whole = f"{node.module}.{alias.name}"
-                exported = node.module in MODULES and assigned_names(node.module, "__all__")
+                exported = node.module in MODULES and exports(node.module)
                 # A package may export a function that has the name of its module.
                 if whole in MODULES and not (exported and alias.name in exported):
                     yield Import(whole, "", node.lineno)
@@ -173,3 +174,19 @@ def assigned_names(module: str, variable: str) -> tuple[str, ...] | None:
             found: tuple[str, ...] = tuple(ast.literal_eval(node.value))
             return found
     return None
+
+
+def exports(module: str) -> tuple[str, ...] | None:
+    """Return what a package exports: its ``__all__``, or without one what it imports of rosz."""
+    listed = assigned_names(module, "__all__")
+    if listed is not None or not is_package(module):
+        return listed
+    imported = (
+        alias.asname or alias.name
+        for node in ast.walk(MODULES[module])
+        if isinstance(node, ast.ImportFrom)
+        and (node.module or "").startswith("rosz.")
+        and node.module != "rosz.lazy"
+        for alias in node.names
+    )
+    return tuple(imported) or None

@@ -8,7 +8,15 @@ from importlib import import_module
 
 import pytest
 
-from arch.house import HAND_WRITTEN, MODULES, SOURCE, assigned_names, is_package, path_of
+from arch.house import (
+    HAND_WRITTEN,
+    MODULES,
+    SOURCE,
+    assigned_names,
+    exports,
+    is_package,
+    path_of,
+)
 
 TOP = {".ci", ".gitignore", "README.md", "interfaces", "launch", "pyproject.toml", "rosz", "tests"}
 LONGEST_FILE = 600
@@ -89,7 +97,7 @@ def test_exports_load_on_first_use() -> None:
     """The tables of modules name where the exports are; mypy does not read them."""
     for module in HAND_WRITTEN:
         if is_package(module) and "__getattr__" in _bound_names(MODULES[module]):
-            for name in assigned_names(module, "__all__") or ():
+            for name in exports(module) or ():
                 getattr(import_module(module), name)
 
 

@@ -14,6 +14,7 @@ from arch.house import (
     MODULES,
     SOURCE,
     assigned_names,
+    exports,
     floor,
     imports,
     is_package,
@@ -178,7 +179,7 @@ def test_imported_names_are_exported() -> None:
         and found.module in MODULES
         and is_package(found.module)
         and package_of(found.module) != package_of(module)
-        and (exported := assigned_names(found.module, "__all__")) is not None
+        and (exported := exports(found.module)) is not None
         and found.name not in exported
         and not within(found.module, GENERATED)
     ]

@@ -23,15 +23,3 @@ else:
             "repair": "Copied TypeDifference check_bag find_differences recover rewrite",
         },
     )
-
-__all__ = (
-    "Copied",
-    "Transfer",
-    "TypeDifference",
-    "check_bag",
-    "divide",
-    "find_differences",
-    "merged",
-    "recover",
-    "rewrite",
-)

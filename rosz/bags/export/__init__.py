@@ -18,16 +18,3 @@ else:
             "tables": "Tables file_names",
         },
     )
-
-__all__ = (
-    "IMAGE_TYPES",
-    "ImageFiles",
-    "Tables",
-    "Video",
-    "VideoTimes",
-    "check_format",
-    "draw",
-    "file_names",
-    "find_curves",
-    "read_curves",
-)

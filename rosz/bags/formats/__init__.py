@@ -20,10 +20,3 @@ else:
             "writing": "removed_unfinished",
         },
     )
-
-__all__ = (
-    "Ros1Reader",
-    "removed_unfinished",
-    "ros1_definition",
-    "write_metadata",
-)

@@ -17,21 +17,3 @@ from rosz.bridges.clients.server import (
 from rosz.bridges.clients.settings import BridgeSettings, ClientLimits
 from rosz.bridges.clients.tasks import ClientTasks, Task, task_worker
 from rosz.bridges.clients.topics import ClientTopics, build
-
-__all__ = (
-    "WRONG_TOO_OFTEN",
-    "BridgeSettings",
-    "ClientLimits",
-    "ClientTasks",
-    "ClientTopics",
-    "OutgoingQueue",
-    "Task",
-    "TopicMessage",
-    "TopicQueue",
-    "WebsocketServer",
-    "build",
-    "host_of",
-    "pieces",
-    "place",
-    "task_worker",
-)

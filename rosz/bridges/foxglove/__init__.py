@@ -16,14 +16,3 @@ from rosz.bridges.foxglove.server import (
     Offer,
     open_bridge,
 )
-
-__all__ = (
-    "CAPABILITIES",
-    "PORT",
-    "SHOWN",
-    "FoxgloveBridge",
-    "FoxgloveLimits",
-    "FoxgloveSettings",
-    "Offer",
-    "open_bridge",
-)

@@ -8,12 +8,3 @@ from __future__ import annotations
 
 from rosz.bridges.ros1.attach import AttachedBridge, CrossingNames
 from rosz.bridges.ros1.bridge import MASTER_PORT, MasterBridge, open_master, running_master
-
-__all__ = (
-    "MASTER_PORT",
-    "AttachedBridge",
-    "CrossingNames",
-    "MasterBridge",
-    "open_master",
-    "running_master",
-)

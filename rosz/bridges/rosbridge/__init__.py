@@ -15,13 +15,3 @@ from rosz.bridges.rosbridge.server import (
     WebsocketBridge,
     open_bridge,
 )
-
-__all__ = (
-    "PORT",
-    "RosApi",
-    "RosbridgeLimits",
-    "RosbridgeSettings",
-    "Spelling",
-    "WebsocketBridge",
-    "open_bridge",
-)

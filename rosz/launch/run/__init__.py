@@ -45,30 +45,5 @@ else:
         },
     )
 
-__all__ = (
-    "LaunchProcess",
-    "LaunchStatus",
-    "MachineOption",
-    "Network",
-    "NodeStatus",
-    "Options",
-    "RouterProcess",
-    "Runner",
-    "StatusClient",
-    "Supervisor",
-    "Timeouts",
-    "Workplace",
-    "container_of",
-    "core_params",
-    "describe_plan",
-    "interrupted_by_signals",
-    "is_local",
-    "is_local_address",
-    "locate",
-    "needs_router",
-    "run_command",
-    "serve",
-    "write_params",
-)
 
 PUBLIC_MODULES = ("report",)

@@ -7,19 +7,3 @@ from rosz.programs.rosserial.device import DeviceService, Half, check_definition
 from rosz.programs.rosserial.link import DevicePort, FilePort, Link, open_serial
 from rosz.programs.rosserial.packets import Damage, Packet, PacketReader, pack
 from rosz.programs.rosserial.server import TcpServer, main
-
-__all__ = (
-    "Damage",
-    "DevicePort",
-    "DeviceService",
-    "FilePort",
-    "Half",
-    "Link",
-    "Packet",
-    "PacketReader",
-    "TcpServer",
-    "check_definition",
-    "main",
-    "open_serial",
-    "pack",
-)

@@ -23,27 +23,3 @@ from rosz.web.scene.setup import (
     read_setup,
 )
 from rosz.web.scene.tools import TOOLS, Tools
-
-__all__ = (
-    "AXES",
-    "DEFAULT",
-    "DEPTH",
-    "DESCRIPTION",
-    "GRID",
-    "HANDLE_TYPE",
-    "MOST_DISPLAYS",
-    "ROBOT",
-    "TF",
-    "TOOLS",
-    "Display",
-    "HandleDisplay",
-    "Held",
-    "Look",
-    "Meshes",
-    "SceneSetup",
-    "Tools",
-    "format_setup",
-    "list_displays",
-    "open_display",
-    "read_setup",
-)
