@@ -44,6 +44,7 @@ from rosz.ros1.modules import (
     add_submodules,
     attribute,
     explain_missing,
+    list_exports,
     submodule,
 )
 from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
@@ -212,6 +213,7 @@ def _loaded(name: str, load: Callable[[], ModuleType]) -> ModuleType:
             raise
         text = f"{error}; {name} needs it, run: pip install 'rosz[{extra}]'"
         raise ModuleNotFoundError(text, name=error.name) from error
+    list_exports(module)
     explain_missing(name, module)
     return module
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
-from types import ModuleType
+from types import FunctionType, MethodType, ModuleType
 from typing import Any, NamedTuple
 
 from rosz.errors import near_miss
@@ -415,6 +415,9 @@ _REASONS = {
     **dict.fromkeys(_NEEDS_TCPROS.split(), _NO_TCPROS),
 }
 
+_VALUES = (str, bytes, int, float, tuple, list, dict, set, frozenset, MethodType)
+"""Types of constants, and of the functions of command lines, which are methods of a `Tool`."""
+
 
 def submodule(name: str) -> ModuleType:
     """Build a module of `MODULES` that is no file, such as ``rospy.impl.tcpros``."""
@@ -433,6 +436,21 @@ def add_submodules(name: str) -> None:
     for inner, module in MODULES.items():
         if inner.rpartition(".")[0] == name and not module.home:
             import_module(inner)
+
+
+def list_exports(module: ModuleType) -> None:
+    """Give a module without ``__all__`` one: the public names that the module itself defines.
+
+    ROS 1's modules have none; ``import *`` of them must not bind what rosz imports there.
+    """
+    own = [key for key, value in vars(module).items() if key[0] != "_" and _defines(module, value)]
+    vars(module).setdefault("__all__", tuple(sorted(own)))
+
+
+def _defines(module: ModuleType, value: object) -> bool:
+    if isinstance(value, type | FunctionType):
+        return value.__module__ == module.__name__
+    return isinstance(value, _VALUES) or type(value).__module__ == module.__name__
 
 
 def explain_missing(name: str, module: ModuleType) -> None:

@@ -139,6 +139,19 @@ def test_all_names_of_a_package(tmp_path: Path, workspace: Path) -> None:
     ]
 
 
+def test_all_names_of_a_module_are_its_own(tmp_path: Path) -> None:
+    code = """
+        from rosz.ros1.importer import install
+        install()
+        before = {*globals()}
+        from rosnode import *
+        bound = {*globals()} - before - {"before"}
+        assert {"ID", "ROSNodeException", "get_node_names", "rosnodemain"} <= bound, bound
+        assert not bound & {"Node", "Sequence", "Survey", "annotations", "sys", "threading"}, bound
+        """
+    assert run(code, tmp_path) == ""
+
+
 def test_modules_by_all_their_names(tmp_path: Path) -> None:
     code = """
         from importlib import import_module

@@ -12,8 +12,6 @@ from typing import Any
 
 from rosz.ros1.client import rospy
 
-__all__ = ("ApproximateTimeSynchronizer", "Cache", "SimpleFilter", "Subscriber", "TimeSynchronizer")
-
 _ROS2_DEPTH = 10
 
 

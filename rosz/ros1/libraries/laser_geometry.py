@@ -12,8 +12,6 @@ import numpy as np
 from rosz.msgs.sensor_msgs.msg import PointCloud2
 from rosz.ros1.libraries.ros_numpy import array_to_pointcloud2
 
-__all__ = ("LaserProjection",)
-
 
 class LaserProjection:
     """Makes point clouds of laser scans.

@@ -27,18 +27,6 @@ from rosz.programs.rosserial import (
 from rosz.ros1 import state
 from rosz.ros1.client import rospy
 
-__all__ = (
-    "Publisher",
-    "RosSerialServer",
-    "SerialClient",
-    "ServiceClient",
-    "ServiceServer",
-    "Subscriber",
-    "load_message",
-    "load_pkg_module",
-    "load_service",
-)
-
 _RETRY_SECONDS = 3.0
 _PUBLISHER, _SUBSCRIBER = TopicInfo.ID_PUBLISHER, TopicInfo.ID_SUBSCRIBER
 _SERVER, _CLIENT = TopicInfo.ID_SERVICE_SERVER, TopicInfo.ID_SERVICE_CLIENT

@@ -13,27 +13,6 @@ from rosz.ros1.importer import type_store
 from rosz.ros1.tool import Tool
 from rosz.ros1.tools.rospkg import ResourceNotFound, RosPack
 
-__all__ = (
-    "MODE_MSG",
-    "MODE_SRV",
-    "ROSMsgException",
-    "fullusage",
-    "get_msg_text",
-    "get_srv_text",
-    "iterate_packages",
-    "list_msgs",
-    "list_srvs",
-    "list_types",
-    "rosmsg_cmd_list",
-    "rosmsg_cmd_md5",
-    "rosmsg_cmd_package",
-    "rosmsg_cmd_packages",
-    "rosmsg_cmd_show",
-    "rosmsg_md5",
-    "rosmsg_search",
-    "rosmsgmain",
-)
-
 MODE_MSG = ".msg"
 MODE_SRV = ".srv"
 

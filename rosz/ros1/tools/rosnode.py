@@ -25,26 +25,6 @@ from rosz.ros1.tools.rosgraph.masterapi import Master, MasterException
 from rosz.ros1.tools.rosgraph.names import script_resolve_name
 from rosz.wire import Token
 
-__all__ = (
-    "ID",
-    "NAME",
-    "ROSNodeException",
-    "ROSNodeIOException",
-    "get_api_uri",
-    "get_machines_by_nodes",
-    "get_node_connection_info_description",
-    "get_node_info_description",
-    "get_node_names",
-    "get_nodes_by_machine",
-    "kill_nodes",
-    "rosnode_cleanup",
-    "rosnode_info",
-    "rosnode_listnodes",
-    "rosnode_ping",
-    "rosnode_ping_all",
-    "rosnodemain",
-)
-
 NAME = "rosnode"
 ID = "/rosnode"
 _KILLED = "rosnode kill"

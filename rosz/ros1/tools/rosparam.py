@@ -16,26 +16,6 @@ from rosz.ros1.tool import Tool
 from rosz.ros1.tools.rosgraph.masterapi import Master
 from rosz.ros1.tools.rosgraph.names import GLOBALNS, get_ros_namespace, make_global_ns
 
-__all__ = (
-    "GLOBALNS",
-    "NAME",
-    "NS",
-    "RosParamException",
-    "RosParamIOException",
-    "delete_param",
-    "dump_params",
-    "get_param",
-    "get_param_server",
-    "list_params",
-    "load_file",
-    "load_str",
-    "print_params",
-    "set_param",
-    "set_param_raw",
-    "upload_params",
-    "yamlmain",
-)
-
 NAME = "rosparam"
 NS = "_ns"
 

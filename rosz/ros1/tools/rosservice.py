@@ -15,22 +15,6 @@ from rosz.ros1.tool import Tool
 from rosz.ros1.tools.rosgraph.masterapi import Master
 from rosz.ros1.tools.rosgraph.names import make_global_ns, script_resolve_name
 
-__all__ = (
-    "NAME",
-    "ROSServiceException",
-    "ROSServiceIOException",
-    "call_service",
-    "get_service_args",
-    "get_service_class_by_name",
-    "get_service_list",
-    "get_service_node",
-    "get_service_type",
-    "get_service_uri",
-    "has_service_args",
-    "rosservice_find",
-    "rosservicemain",
-)
-
 NAME = "rosservice"
 
 

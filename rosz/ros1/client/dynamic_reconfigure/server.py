@@ -16,8 +16,6 @@ from rosz.ros1.client.dynamic_reconfigure import (
 )
 from rosz.ros1.exceptions import raised_as
 
-__all__ = ("Server",)
-
 _RETURNED_NOTHING = "Reconfigure callback should return a possibly updated configuration."
 
 

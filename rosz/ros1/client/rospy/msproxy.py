@@ -9,8 +9,6 @@ from rosz.ros1.client.rospy.names import get_name, resolve_name
 from rosz.ros1.exceptions import raised_as
 from rosz.ros1.tools.rosgraph.masterapi import Master, MasterError
 
-__all__ = ("MasterProxy",)
-
 
 class MasterProxy:
     """The Master API for the node of this process (ROS wiki, ROS/Master_API).

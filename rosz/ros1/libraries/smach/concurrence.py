@@ -17,8 +17,6 @@ from rosz.ros1.libraries.smach.util import (
     logwarn,
 )
 
-__all__ = ("Concurrence",)
-
 _CHECK_PERIOD = 0.1
 """Seconds after which a wait looks whether the program ends."""
 

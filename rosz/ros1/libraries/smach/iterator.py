@@ -8,8 +8,6 @@ from typing import Any
 from rosz.ros1.libraries.smach.container import Container, run_user_code
 from rosz.ros1.libraries.smach.util import is_shutdown, loginfo, logwarn
 
-__all__ = ("Iterator",)
-
 Items = Iterable[Any] | Callable[[], Iterable[Any]]
 
 

@@ -7,8 +7,6 @@ from typing import Any
 
 from rosz.ros1.libraries.smach.util import has_smach_interface
 
-__all__ = ("CBState", "State")
-
 
 class State:
     """Base class of states; a state of a program overrides `execute`.

@@ -8,8 +8,6 @@ from typing import Any
 
 from rosz.ros1.libraries.smach.util import InvalidUserCodeError, logerr
 
-__all__ = ("Const", "Remapper", "UserData", "get_const")
-
 
 class _Values:
     """Values by key; each key that does not begin with ``_`` is an attribute, too."""

@@ -11,8 +11,6 @@ from rosz.ros1.client import rospy
 from rosz.ros1.client.actionlib import SimpleActionServer
 from rosz.ros1.libraries.smach import Container, InvalidUserCodeError, Remapper, UserData
 
-__all__ = ("ActionServerWrapper",)
-
 
 class ActionServerWrapper:
     """An action server that executes a container for each goal.

@@ -24,15 +24,6 @@ from rosz.ros1.client import rospy
 from rosz.ros1.libraries.smach import Container, UserData
 from rosz.ros1.tools import rostopic
 
-__all__ = (
-    "INIT_TOPIC",
-    "STATUS_TOPIC",
-    "STRUCTURE_TOPIC",
-    "ContainerProxy",
-    "IntrospectionClient",
-    "IntrospectionServer",
-)
-
 STATUS_TOPIC = "/smach/container_status"
 INIT_TOPIC = "/smach/container_init"
 STRUCTURE_TOPIC = "/smach/container_structure"

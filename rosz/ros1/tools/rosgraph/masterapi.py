@@ -18,17 +18,6 @@ from rosz.ros1.state import params_of, ready_context, survey, token_uri
 from rosz.ros1.tools.rosgraph.names import get_master_uri, make_caller_id, make_global_ns
 from rosz.wire import Kind, Token
 
-__all__ = (
-    "Error",
-    "Failure",
-    "Master",
-    "MasterError",
-    "MasterException",
-    "MasterFailure",
-    "ROSMasterException",
-    "is_online",
-)
-
 Pairs = list[list[str]]
 """Names with their types."""
 

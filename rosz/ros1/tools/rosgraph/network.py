@@ -13,21 +13,6 @@ from urllib.parse import urlsplit
 
 from rosz.ros1.tools.rosgraph.names import find_option
 
-__all__ = (
-    "ROSHandshakeException",
-    "create_local_xmlrpc_uri",
-    "decode_ros_handshake_header",
-    "encode_ros_handshake_header",
-    "get_address_override",
-    "get_bind_address",
-    "get_host_name",
-    "get_local_address",
-    "get_local_addresses",
-    "is_local_address",
-    "parse_http_host_and_port",
-    "use_ipv6",
-)
-
 _NOWHERE = ("10.255.255.255", 1)
 """No packet is sent there: connecting a UDP socket only chooses the local address."""
 

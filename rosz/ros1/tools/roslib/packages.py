@@ -9,42 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from rosz.packages import Package, manifest_of
-from rosz.ros1.modules import MODULES
-from rosz.ros1.tools.rospkg import MANIFEST_FILE, PACKAGE_FILE, ResourceNotFound, RosPack
+from rosz.ros1 import modules
+from rosz.ros1.tools import rospkg
+from rosz.ros1.tools.rospkg import ResourceNotFound, RosPack
 
-__all__ = (
-    "MANIFEST_FILE",
-    "PACKAGE_FILE",
-    "TYPE_SEPARATOR",
-    "InvalidROSPkgException",
-    "MultipleNodesException",
-    "ROSEnvException",
-    "ROSLibException",
-    "ROSPkgException",
-    "find_node",
-    "find_resource",
-    "get_depends",
-    "get_dir_pkg",
-    "get_master",
-    "get_pkg_dir",
-    "get_pkg_subdir",
-    "is_interactive",
-    "list_package_resources",
-    "list_package_resources_by_dir",
-    "list_pkgs",
-    "list_pkgs_by_path",
-    "load_manifest",
-    "resource_file",
-    "rospack_depends",
-    "rospack_depends_1",
-    "rospack_depends_on",
-    "rospack_depends_on_1",
-    "set_interactive",
-)
-
+MANIFEST_FILE, PACKAGE_FILE = rospkg.MANIFEST_FILE, rospkg.PACKAGE_FILE
 TYPE_SEPARATOR = "/"
 
-_PROVIDED = frozenset({*MODULES, "roscpp", "rosconsole", "rosout", "roswtf"})
+_PROVIDED = frozenset({*modules.MODULES, "roscpp", "rosconsole", "rosout", "roswtf"})
 """Packages of ROS itself that are not folders here; their modules need no path."""
 
 
