@@ -11,9 +11,9 @@ from collections import abc
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rosz.ros1.libraries.smach import util
+from rosz.ros1.libraries.smach import container
 from rosz.ros1.libraries.smach.concurrence import Concurrence
-from rosz.ros1.libraries.smach.container import Container, execute_state
+from rosz.ros1.libraries.smach.container import Container
 from rosz.ros1.libraries.smach.iterator import Iterator
 from rosz.ros1.libraries.smach.state import CBState, State
 from rosz.ros1.libraries.smach.user_data import Remapper, UserData
@@ -31,29 +31,6 @@ from rosz.ros1.libraries.smach.util import (
     logwarn,
     set_loggers,
 )
-
-__all__: tuple[str, ...] = (
-    "CBState",
-    "Concurrence",
-    "Container",
-    "InvalidConstructionError",
-    "InvalidStateError",
-    "InvalidTransitionError",
-    "InvalidUserCodeError",
-    "Iterator",
-    "Remapper",
-    "Sequence",
-    "SmachError",
-    "State",
-    "StateMachine",
-    "UserData",
-    "logdebug",
-    "logerr",
-    "loginfo",
-    "logwarn",
-    "set_loggers",
-)
-__all__ += util.__all__
 
 Transitions = dict[str, str | None]
 
@@ -196,7 +173,7 @@ class StateMachine(Container):
         for key, value in self._constants[label].items():
             self.userdata[key] = value
         what = f"state '{label}' of type '{state}'"
-        outcome = execute_state(what, state, self.userdata, self._remappings[label])
+        outcome = container.execute_state(what, state, self.userdata, self._remappings[label])
         with self._state_transitioning_lock:
             return self._follow(label, state, outcome)
 

@@ -19,18 +19,6 @@ from rosz.ros1.libraries.smach_ros.action_server_wrapper import ActionServerWrap
 from rosz.ros1.libraries.smach_ros.callback_states import ServiceState, SimpleActionState
 from rosz.ros1.libraries.smach_ros.introspection import IntrospectionClient, IntrospectionServer
 
-__all__ = (
-    "ActionServerWrapper",
-    "ConditionState",
-    "IntrospectionClient",
-    "IntrospectionServer",
-    "MonitorState",
-    "RosState",
-    "ServiceState",
-    "SimpleActionState",
-    "set_preempt_handler",
-)
-
 smach.set_loggers(rospy.loginfo, rospy.logwarn, rospy.logdebug, rospy.logerr)
 smach.set_shutdown_check(rospy.is_shutdown)
 

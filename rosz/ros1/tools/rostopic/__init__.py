@@ -19,17 +19,6 @@ from rosz.ros1.tools.rostopic.callbacks import _str_plot as _str_plot
 from rosz.ros1.tools.rostopic.callbacks import _str_plot_fields as _str_plot_fields
 from rosz.ros1.tools.rostopic.topics import *  # noqa: F403
 
-__all__: tuple[str, ...] = (
-    "CallbackEcho",
-    "ROSTopicBandwidth",
-    "ROSTopicDelay",
-    "ROSTopicHz",
-    "create_field_filter",
-    "create_value_transform",
-    "rostopicmain",
-)
-__all__ += topics.__all__
-
 _tool = Tool(topics.NAME)
 rostopicmain = _tool.main
 _fullusage = _tool.print_usage
