@@ -27,7 +27,7 @@ import signal
 import threading
 import weakref
 from collections.abc import Callable
-from typing import Protocol, Self, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 from rosz.errors import ClosedError
 
@@ -71,6 +71,59 @@ class Closing:
 
 P = TypeVar("P", bound=Closable)
 T = TypeVar("T")
+
+
+C = TypeVar("C", bound=Closable)
+
+
+class Use(Generic[C]):
+    """The use of something shared, until it is closed.
+
+    Attributes:
+        value: What is shared.
+    """
+
+    def __init__(self, shared: SharedResource[C], value: C) -> None:
+        self._shared: SharedResource[C] | None = shared
+        self.value: C = value
+
+    def close(self) -> None:
+        """End the use; a second call has no effect."""
+        shared, self._shared = self._shared, None
+        if shared is not None:
+            shared.release()
+
+
+class SharedResource(Generic[C]):
+    """Something that the first user opens, by a function, and the last one closes."""
+
+    def __init__(self, open_one: Callable[[], C]) -> None:
+        self._open = open_one
+        self._lock = threading.Lock()
+        self._value: C | None = None
+        self._users = 0
+
+    def use(self) -> Use[C]:
+        """Open it, unless it is open, and count a user.
+
+        Raises:
+            RoszError: It cannot be opened.
+        """
+        with self._lock:
+            if self._value is None:
+                self._value = self._open()
+            self._users += 1
+            return Use(self, self._value)
+
+    def release(self) -> None:
+        """Count one user less, and close it after the last one."""
+        with self._lock:
+            self._users -= 1
+            if self._users:
+                return
+            value, self._value = self._value, None
+        if value is not None:
+            value.close()
 
 
 class Registration:

@@ -14,7 +14,7 @@ from rosz.bags.bag import (
     Entry,
     Payload,
 )
-from rosz.bags.formats.events import event_definition
+from rosz.bags.formats.channel_text import event_definition
 from rosz.errors import DefinitionError, TypeNotFound
 from rosz.lifecycle import Closing
 from rosz.message import Message

@@ -60,7 +60,7 @@ _APPS = {
     "web": "system:web",
     "doctor": "system:doctor",
     "turtlesim": "pictures:turtlesim",
-    "help": "manual:app",
+    "help": "system:manual",
 }
 """Module and name of each app that is not ``app`` in the module named like its command."""
 

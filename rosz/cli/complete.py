@@ -17,8 +17,8 @@ from rosz.cli import suggest
 from rosz.cli.commands import COMMANDS, OLD_NAMES, load
 from rosz.cli.declare import Argument, CommandParameter, Option
 from rosz.cli.env import ALIASES
-from rosz.cli.manual import pages
 from rosz.cli.suggest import Line, Source
+from rosz.cli.system import pages
 from rosz.environment import Environment
 from rosz.errors import RoszError
 

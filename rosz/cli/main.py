@@ -121,7 +121,7 @@ def _describe(error: OSError) -> str:
 
 def _dispatch(argv: list[str]) -> int:
     if argv[:1] == ["help"] and argv[1:2] and argv[1] in COMMANDS:
-        from rosz.cli.manual import pages
+        from rosz.cli.system import pages
 
         if len(argv) > 2 or argv[1] not in pages():  # noqa: PLR2004  # a command of a group
             argv = [*argv[1:], "--help"]

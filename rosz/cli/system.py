@@ -1,4 +1,4 @@
-"""``rosz doctor`` and ``rosz web``: the whole system, its problems or as it runs."""
+"""``rosz doctor``, ``rosz web`` and ``rosz help``: the whole system, and the manual about it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from rosz.cli.commands import COMMANDS, format_rows
 from rosz.cli.console import (
     count,
     paint,
@@ -18,16 +19,19 @@ from rosz.cli.console import (
     until_stopped,
     warn,
 )
-from rosz.cli.declare import App, Json, Option, at_least, seconds
+from rosz.cli.declare import App, Argument, Json, Option, at_least, seconds
+from rosz.errors import NotFoundError, near_miss
 
 if TYPE_CHECKING:
     from rosz.doctor import Examination, Finding
 
 doctor = App()
 web = App()
+manual = App()
 
 _LONG = 3600.0
 _LAST_PORT = 65535
+_MANUAL = Path(__file__).parents[1] / "share" / "manual"
 
 
 @doctor.command()
@@ -123,3 +127,38 @@ def web_command(
         print_lines(["press Ctrl-C to end it"])
         while True:
             time.sleep(_LONG)
+
+
+def pages() -> dict[str, Path]:
+    """Return the pages of the manual by topic."""
+    return {path.stem: path for path in sorted(_MANUAL.glob("*.md"))}
+
+
+def topics() -> dict[str, str]:
+    """Return the title of each page of the manual, which is its first heading, by topic."""
+    titles = {}
+    for topic, path in pages().items():
+        lines = path.read_text(encoding="utf-8").splitlines()
+        headings = (line for line in lines if line.startswith("#"))
+        titles[topic] = next(headings, topic).lstrip("# ")
+    return titles
+
+
+@manual.command()
+def help_command(
+    topic: Annotated[
+        str, Argument("TOPIC", "A page of the manual, or a command; lists the pages if empty.")
+    ] = "",
+) -> None:
+    """Print a page of the manual, or list the pages.
+
+    'rosz help COMMAND' prints what 'rosz COMMAND --help' prints, unless a page has that name.
+    """
+    paths = pages()
+    if not topic:
+        sys.stdout.write(f"Usage: rosz help TOPIC\n\nTopics:\n{format_rows(topics().items())}")
+    elif topic in paths:
+        sys.stdout.write(paths[topic].read_text(encoding="utf-8"))
+    else:
+        hint = near_miss(topic, [*paths, *COMMANDS]) or "; 'rosz help' lists the topics"
+        raise NotFoundError(f"no page of the manual is called '{topic}'{hint}")

@@ -61,7 +61,17 @@ if TYPE_CHECKING:
         set_level,
     )
     from rosz.introspect.publish import DEFAULT_RATE, ONCE_SECONDS, Sender, SendOptions
-    from rosz.introspect.rosout import LogFilter, LogLine, format_line, read_line
+    from rosz.introspect.rosout import (
+        GATHERED,
+        LOGS,
+        LogFilter,
+        LogLine,
+        format_line,
+        is_log,
+        read_line,
+        to_ros1_log,
+        to_ros2_log,
+    )
     from rosz.introspect.services import (
         call_service,
         find_server,
@@ -105,7 +115,8 @@ else:
             "nodes": "PING_TIMEOUT NodeEntry find_nodes format_connections format_node get_info"
             " get_levels kill kill_nodes list_nodes machines nodes_on_machine ping set_level",
             "publish": "DEFAULT_RATE ONCE_SECONDS Sender SendOptions",
-            "rosout": "LogFilter LogLine format_line read_line",
+            "rosout": "GATHERED LOGS LogFilter LogLine format_line is_log read_line to_ros1_log"
+            " to_ros2_log",
             "services": "call_service find_server list_services service_key services_of_type"
             " wait_for_server",
             "subscribe": "find_class find_token resolve_field subscribe_samples topic_types"

@@ -1,8 +1,15 @@
 """The keys, tokens and attachments of ROS 2's rmw_zenoh, and the endpoints of Zenoh; pure."""
 
-from rosz.wire.attachment import pack_attachment, read_attachment
 from rosz.wire.endpoint import Endpoint
-from rosz.wire.ids import FOREIGN_DIGITS, gid, host_number, id_prefix, is_rosz_id
+from rosz.wire.ids import (
+    FOREIGN_DIGITS,
+    gid,
+    host_number,
+    id_prefix,
+    is_rosz_id,
+    pack_attachment,
+    read_attachment,
+)
 from rosz.wire.tokens import (
     NO_HASH,
     OWN_SPACE,

@@ -1,8 +1,11 @@
-"""Ids of entities and of sessions.
+"""Ids of entities and of sessions, and the attachments that carry them.
 
 The GID of an entity is XXH3-128 of its liveliness token (rmw_zenoh). This implements only the
 part for tokens: seed 0, and inputs of 17 bytes or more. The algorithm is specified in the xxHash
 project's document "XXH3 algorithm overview".
+
+Every publication, request and reply carries an attachment (rmw_zenoh): the sequence number and the
+source time as little-endian 64-bit integers, and the GID after its length.
 
 Zenoh's ids of sessions are up to 32 hexadecimal digits, and those of other programs are random. Ids
 of rosz begin with a mark and a number for the host, and have none of the digits ``a`` to ``e``. So
@@ -13,7 +16,9 @@ million random ids have none of them.
 from __future__ import annotations
 
 import zlib
-from struct import unpack_from
+from struct import Struct, unpack_from
+
+from rosz.errors import DecodeError
 
 FOREIGN_DIGITS = "abcde"
 """The digits that no id of rosz has."""
@@ -37,6 +42,11 @@ _MEDIUM = 128
 _LONG = 240
 _STRIPE = 64
 _STRIPES_PER_BLOCK = 16
+
+_GID_SIZE = 16
+_LAYOUT = Struct("<qqB16s")
+_OLD_SIZE = 77
+_pack = _LAYOUT.pack
 
 
 def id_prefix(host: str) -> str:
@@ -145,3 +155,36 @@ def _long(data: bytes) -> tuple[int, int]:
         return _avalanche(total & _M)
 
     return merge(11, size * _P1 & _M), merge(117, ~(size * _P2) & _M)
+
+
+def pack_attachment(sequence: int, source_time: int, gid: bytes) -> bytes:
+    """Return the 33 bytes of an attachment.
+
+    Args:
+        sequence: The number of the sample within its publisher or client, from 1.
+        source_time: The sender's time of sending, in nanoseconds since the Unix epoch.
+        gid: The 16 bytes that identify the publisher or client.
+    """
+    return _pack(sequence, source_time, _GID_SIZE, gid)
+
+
+def read_attachment(data: bytes | None) -> tuple[int, int, bytes]:
+    """Return the sequence number, source time and GID of an attachment.
+
+    Every sample received costs one call of this.
+
+    Raises:
+        DecodeError: The attachment is missing, damaged, or in the layout of an older release.
+    """
+    if data is None:
+        raise DecodeError("attachment", -1, "missing; the sender is not a node of ROS 2 or rosz")
+    if len(data) == _OLD_SIZE:
+        raise DecodeError(
+            "attachment", 0, "in the layout of rmw_zenoh before 0.2.5; update the sender"
+        )
+    if len(data) != _LAYOUT.size:
+        raise DecodeError("attachment", 0, f"{len(data)} bytes, expected {_LAYOUT.size}")
+    sequence, source_time, size, gid = _LAYOUT.unpack(data)
+    if size != _GID_SIZE:
+        raise DecodeError("attachment", 16, f"a GID of {size} bytes, expected {_GID_SIZE}")
+    return sequence, source_time, gid

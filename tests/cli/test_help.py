@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rosz.cli import manual
+from rosz.cli import system
 from rosz.cli.commands import COMMANDS, load
 from rosz.cli.declare import Option
 from rosz.cli.main import run
@@ -109,15 +109,15 @@ def test_a_mistake_points_at_the_help_of_its_command(capsys: pytest.CaptureFixtu
 
 def test_the_manual_lists_its_pages(capsys: pytest.CaptureFixture[str]) -> None:
     text = told(capsys, "help")
-    for topic, title in manual.topics().items():
+    for topic, title in system.topics().items():
         assert f"  {topic} " in text
         assert f" {title}\n" in text
-    assert {"commands", "security"} <= manual.topics().keys()
+    assert {"commands", "security"} <= system.topics().keys()
 
 
-@pytest.mark.parametrize("topic", manual.pages())
+@pytest.mark.parametrize("topic", system.pages())
 def test_the_manual_prints_a_page(topic: str, capsys: pytest.CaptureFixture[str]) -> None:
-    page = manual.pages()[topic].read_text(encoding="utf-8")
+    page = system.pages()[topic].read_text(encoding="utf-8")
     assert page.startswith("# ")
     assert told(capsys, "help", topic) == page
 
@@ -130,7 +130,7 @@ def test_an_unknown_page(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_page_of_commands_names_them_all() -> None:
-    page = manual.pages()["commands"].read_text(encoding="utf-8")
+    page = system.pages()["commands"].read_text(encoding="utf-8")
     for name in COMMANDS:
         assert f"rosz {name}" in page
         for command in filter(None, load(name).commands):

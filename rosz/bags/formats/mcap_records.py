@@ -14,9 +14,13 @@ from collections.abc import Iterator, Mapping
 import msgspec
 
 from rosz.bags.bag import Channel, Compression, Payload, compression_library
+from rosz.bags.formats.channel_text import (
+    event_definition,
+    event_type,
+    format_profiles,
+    parse_profiles,
+)
 from rosz.bags.formats.chunks import ChunkError, unpack
-from rosz.bags.formats.events import event_definition, event_type
-from rosz.bags.formats.qos_text import format_profiles, parse_profiles
 from rosz.errors import RoszError
 from rosz.qos import LATCHED
 

@@ -29,9 +29,9 @@ from rosz.bags.bag import (
     FileErrors,
     refuse_damage,
 )
+from rosz.bags.formats.channel_text import parse_profiles
 from rosz.bags.formats.chunks import ChunkError, unpack_file, unpack_message
 from rosz.bags.formats.mcap_reader import McapReader
-from rosz.bags.formats.qos_text import parse_profiles
 from rosz.errors import BagError
 from rosz.lifecycle import Closing
 

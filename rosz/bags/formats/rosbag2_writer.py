@@ -25,9 +25,9 @@ from rosz.bags.bag import (
     Payload,
     compression_library,
 )
+from rosz.bags.formats.channel_text import format_profiles, profile_rows
 from rosz.bags.formats.mcap_reader import McapReader
 from rosz.bags.formats.mcap_writer import McapWriter
-from rosz.bags.formats.qos_text import format_profiles, profile_rows
 from rosz.bags.formats.rosbag2_reader import METADATA, METADATA_RECORD, Storage
 from rosz.bags.formats.writing import BagUnfinished
 from rosz.errors import BagError, ClosedError, UsageError

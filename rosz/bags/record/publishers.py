@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 
 from rosz.bags.bag import Channel
-from rosz.bags.formats.events import event_definition
+from rosz.bags.formats.channel_text import event_definition
 from rosz.bags.record.queue import RecordedPublisher
 from rosz.errors import RoszError
 from rosz.graph import Followed

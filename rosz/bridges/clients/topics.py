@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any, Generic, TypeAlias
 
 from rosz.bridges.clients.queues import M, TopicQueue
-from rosz.bridges.logs import GATHERED, LOGS
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
+from rosz.introspect import GATHERED, LOGS
 from rosz.message import from_plain
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.rcl_interfaces.msg import Log as Ros2Log

@@ -12,8 +12,8 @@ from typing import Any
 
 import msgspec
 
-from rosz.bridges.logs import LOGS, to_ros1_log, to_ros2_log
 from rosz.errors import TypeNotFound
+from rosz.introspect import LOGS, to_ros1_log, to_ros2_log
 from rosz.message import Message, compile_from_cdr, compile_transcoder
 from rosz.qos import ROSOUT, QoS
 from rosz.typestore import TypeStore

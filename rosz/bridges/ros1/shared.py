@@ -7,10 +7,10 @@ from functools import partial
 
 import msgspec
 
-from rosz.bridges.logs import GATHERED, LOGS
 from rosz.bridges.ros1.codec import Codecs
 from rosz.bridges.ros1.peers import Prober
 from rosz.bridges.ros1.sockets import SocketLoop, log
+from rosz.introspect import GATHERED, LOGS
 from rosz.lifecycle import Lifecycle
 from rosz.names import is_of_action
 from rosz.node import Context

@@ -9,9 +9,9 @@ from typing import Any, TypeAlias
 import msgspec
 
 from rosz.bridges.clients import TopicMessage, TopicQueue
-from rosz.bridges.logs import is_log, to_ros1_log
 from rosz.bridges.rosbridge.operations import Compression, Subscribe
 from rosz.bridges.rosbridge.plain import Spelling, converter
+from rosz.introspect import is_log, to_ros1_log
 from rosz.queue import BoundedQueue
 
 Form: TypeAlias = tuple[Compression, Spelling]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from rosz.bridges.logs import is_log, to_ros2_log
 from rosz.bridges.rosbridge import operations as ops
 from rosz.bridges.rosbridge.encoded import SubscribedQueue
 from rosz.bridges.rosbridge.messages import build_from_json
 from rosz.bridges.rosbridge.state import ClientState
+from rosz.introspect import is_log, to_ros2_log
 from rosz.msgs.rosgraph_msgs.msg import Log
 from rosz.node import Publisher
 

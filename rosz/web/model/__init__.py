@@ -5,6 +5,7 @@ the newest wins. Pages read what they show at their own pace, so that a slow bro
 up.
 """
 
+from rosz.lifecycle import SharedResource
 from rosz.web.model.actions import ActionRow, Actions, ActionUse, GoalRow, SentGoal
 from rosz.web.model.bag_orders import BagCommand, BagOrder, BagReport, PlayOrder, RecordOrder
 from rosz.web.model.bags import COMPRESSIONS, BagRun, Bags
@@ -19,7 +20,6 @@ from rosz.web.model.pictures import IMAGE_TYPES, ImageWatch
 from rosz.web.model.plotting import Plot, split_fields
 from rosz.web.model.reconfiguring import Reconfiguration
 from rosz.web.model.sending import Sending, call_service
-from rosz.web.model.sharing import SharedResource
 from rosz.web.model.system import Findings, System
 from rosz.web.model.topic import FieldCondition, TopicWatch, message_tree
 from rosz.web.model.traffic import Traffic

@@ -31,6 +31,7 @@ from rosz.actions import (
 )
 from rosz.errors import ActionError, GoalFailed, NotFoundError, RoszError
 from rosz.graph import View
+from rosz.lifecycle import SharedResource, Use
 from rosz.message import strify_message
 from rosz.msgs.action_msgs.msg import GoalInfo
 from rosz.msgs.action_msgs.msg import GoalStatusArray as StatusArray
@@ -40,7 +41,6 @@ from rosz.names import short_type
 from rosz.qos import LATCHED
 from rosz.queue import BoundedQueue
 from rosz.web.model.forms import read_form
-from rosz.web.model.sharing import SharedResource, Use
 from rosz.worker import Worker, run_task
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from rosz.environment import Environment
 from rosz.errors import RoszError
 from rosz.graph import View
 from rosz.introspect import Survey
+from rosz.lifecycle import SharedResource
 from rosz.node import Node
 from rosz.web.model.actions import Actions
 from rosz.web.model.bags import Bags
@@ -20,7 +21,6 @@ from rosz.web.model.frames import Frames
 from rosz.web.model.launches import Launches
 from rosz.web.model.parameters import ParameterModel
 from rosz.web.model.pictures import PictureSources
-from rosz.web.model.sharing import SharedResource
 from rosz.web.model.traffic import Traffic
 from rosz.worker import Worker, run_task
 
