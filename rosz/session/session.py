@@ -99,7 +99,6 @@ class Session(Closing):
         self._registration: LocalRegistration | None = None
         self._link_watch: Closable | None = None
         self._tokens: WeakValueDictionary[str, Declared] = WeakValueDictionary()
-        self._stale_tokens: set[str] = set()
 
     @classmethod
     def open(cls, config: SessionConfig, peers: LocalPeers | None = None) -> Session:
@@ -364,8 +363,7 @@ class Session(Closing):
                 been reported.
             many: Whether hundreds of tokens may come at once; watching costs more then.
         """
-        live = partial(self.live_tokens, key, _TOKENS_SECONDS)
-        watch = TokenWatch(callback, self._tokens, self._stale_tokens, live)
+        watch = TokenWatch(callback, self._tokens, lambda: self.live_tokens(key, _TOKENS_SECONDS))
         make = declare if many else declare_callback
         with translate_errors("watch tokens", key):
             liveliness = self._raw.liveliness()

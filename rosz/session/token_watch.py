@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from itertools import takewhile
 
 import zenoh
 
@@ -12,26 +11,22 @@ from rosz.errors import ClosedError, TransportError
 from rosz.session.declared import Declared
 from rosz.session.queries import Replies
 
-_RECENT_SECONDS = 5.0
-"""Seconds after the end of a token in which a report that it exists may be an old one."""
-_LOOKS = 3
-"""Queries that must all miss a token before it counts as ended."""
+_UNSETTLED_SECONDS = 10.0
+"""Seconds from its beginning in which a watch may be told of the end of a token first."""
 
 
 class TokenWatch:
     """Reports tokens, on the thread of its watch.
 
-    Seen with eclipse-zenoh 1.10.2: a session whose watch begins while tokens disappear may be told
-    of the end of some of these first, and then that they exist. It remembers these for ever, and
-    reports them to each watch that begins later, but not to queries.
-    `tests/session/test_token_watch.py` shows it; it is not reported upstream yet. Only for such
-    tokens queries decide: while tokens come and go, a query may miss some that exist.
+    Seen with eclipse-zenoh 1.10.2: a watch that begins while tokens disappear may be told of the
+    end of some of these first, and then that they exist. `tests/interop/test_hostile.py` shows it;
+    it is not reported upstream yet. Only for such tokens a query decides: while tokens come and go,
+    a query may miss some that exist.
 
     Args:
         callback: Function called with the key of a token, and with whether it appeared (true) or
             disappeared (false).
         own: The tokens of the session by their keys.
-        stale: The tokens that the session remembers wrongly; all its watches share them.
         live: Function that returns the keys of the tokens that are alive, by a query.
 
     Attributes:
@@ -43,61 +38,48 @@ class TokenWatch:
         self,
         callback: Callable[[str, bool], None],
         own: Mapping[str, Declared],
-        stale: set[str],
         live: Callable[[], list[str]],
     ) -> None:
         self.complete: Callable[[], None] | None = None
         self.existing: Replies | None = None
         self._callback = callback
         self._own = own
-        self._stale = stale
         self._live = live
-        self._found: frozenset[str] = frozenset()
         self._missing: set[str] = set()
         self._seen: set[str] = set()
         self._appeared: set[str] = set()
-        self._ended: dict[str, float] = {}
-        self._doubtful: set[str] = set()
+        self._gone: set[str] = set()
+        self._settled = time.monotonic() + _UNSETTLED_SECONDS
 
     def begin(self) -> None:
         """Wait for the tokens that a query finds."""
         if self.existing is not None:
             replies, self.existing = self.existing, None
-            self._found = frozenset(reply.key for reply in replies if reply.ok)
-            self._missing = set(self._found)
+            self._missing = {reply.key for reply in replies if reply.ok}
             del replies
 
     def deliver(self, sample: zenoh.Sample) -> None:
         """Report that a token appeared or disappeared."""
         token, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-        if self.complete is not None:
-            self._seen.add(token)
-        if not alive:
-            self._note_end(token)
-        elif self.complete is not None:
-            self._appeared.add(token)  # `idle` looks for all of these at once, as for the doubtful
-        elif token in self._stale or self._ended_recently(token):
-            self._doubtful.add(token)
+        self._note(token, alive=alive)
+        # Before the watch is complete, one query for all of these comes at the end.
+        ended = alive and self.complete is None and token in self._gone
+        if ended and token not in self._alive({token}):
             return
+        own = self._own.get(token)
         # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
-        if alive or not self._is_own(token):
+        if alive or own is None or own.closed:
             self._callback(token, alive)
 
     def idle(self) -> None:
-        """Report doubtful tokens, and that all tokens that existed have been reported."""
+        """Report that all tokens that existed have been reported, if they have."""
         report = self.complete
-        if report is not None:
-            if not self._is_complete():
-                return
-            doubtful = (self._appeared - self._found) | (self._appeared & self._ended.keys())
-            for token in self._without_live(doubtful):
-                self._callback(token, False)
+        if report is not None and self._is_complete():
+            if doubtful := self._appeared & self._gone:
+                for token in doubtful - self._alive(doubtful):  # it disappeared unnoticed
+                    self._callback(token, False)
             self.complete = None
             report()
-        if self._doubtful:
-            doubtful, self._doubtful = self._doubtful, set()
-            for token in doubtful - self._without_live(doubtful):
-                self._callback(token, True)
 
     def _is_complete(self) -> bool:
         """Return whether all tokens of the query have been reported, but those that ended before.
@@ -109,32 +91,20 @@ class TokenWatch:
             self._missing = missing.intersection(self._alive(missing))
         return self._missing <= self._seen
 
-    def _is_own(self, token: str) -> bool:
-        own = self._own.get(token)
-        return own is not None and not own.closed
-
-    def _without_live(self, tokens: set[str]) -> set[str]:
-        """Return those of some tokens of others that no query finds, and remember them as stale."""
-        rest = {token for token in tokens if not self._is_own(token)}
-        for _ in range(_LOOKS):
-            if rest:
-                rest -= self._alive(rest)
-        self._stale -= tokens
-        self._stale |= rest
-        return rest
-
     def _alive(self, otherwise: set[str]) -> set[str]:
         try:
             return set(self._live())
         except (ClosedError, TransportError):
             return otherwise  # the watch ends with its session
 
-    def _note_end(self, token: str) -> None:
-        self._doubtful.discard(token)
-        self._ended.pop(token, None)
-        self._ended[token] = time.monotonic()
-        for key in tuple(takewhile(lambda key: not self._ended_recently(key), self._ended)):
-            del self._ended[key]
-
-    def _ended_recently(self, token: str) -> bool:
-        return time.monotonic() - self._ended.get(token, -_RECENT_SECONDS) < _RECENT_SECONDS
+    def _note(self, token: str, *, alive: bool) -> None:
+        if self.complete is not None:
+            self._seen.add(token)
+        elif time.monotonic() > self._settled:
+            self._appeared.clear()
+            self._gone.clear()
+            return
+        if alive:
+            self._appeared.add(token)
+        elif token not in self._appeared:
+            self._gone.add(token)  # one that was told of before may truly come again
