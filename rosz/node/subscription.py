@@ -228,31 +228,21 @@ class Subscription(Entity, Generic[M]):
 
     def _receive(self, sample: AnySample, decoder: SampleDecoder | None = None) -> None:
         """Put a sample into the queue, on a thread of the session; its key may tell no type."""
-        self._queue.put((sample, decoder))
-        if self._callback is not None and self._queue_worker is None:
-            with self._making, within(self.node.program):
-                if self._queue_worker is None:
-                    self._queue_worker = Worker(
-                        f"rosz-sub{self.name}",
-                        self._dispatch_queued,
-                        receive=self._queue.receive,
-                    )
-
-    def _receive_replay(self, decoder: SampleDecoder, reply: Reply) -> None:
-        """Put a replayed sample into the queue, behind the live ones that it may overtake."""
-        if self._callback is None and self._waits_for(reply, decoder):
-            with self._making, within(self.node.program), suppress(ClosedError):
-                if self._queue_worker is None:
-                    self._queue_worker = self.keep(
-                        Worker(f"rosz-sub{self.name}", self._put_replay, logger=self.node.log)
-                    )
-                self._queue_worker.submit((reply, decoder))
+        if self._callback is not None:
+            self._queue.put((sample, decoder))
+            make = partial(Worker, handle=self._dispatch_queued, receive=self._queue.receive)
+        elif _is_ahead(sample, decoder, self._history.opened):
+            make = partial(Worker, handle=partial(self._await_live, then=self._queue.put))
         else:
-            self._receive(reply, decoder)
-
-    def _put_replay(self, item: _Item) -> None:
-        self._await_live(item)
-        self._queue.put(item)
+            self._queue.put((sample, decoder))
+            return
+        worker = self._queue_worker
+        if worker is None:
+            with self._making, within(self.node.program):
+                worker = self._queue_worker = self._queue_worker or make(f"rosz-sub{self.name}")
+        if self._callback is None:
+            with suppress(ClosedError):
+                worker.submit((sample, decoder))
 
     def _receive_message(self, sample: LocalSample) -> None:
         """Put a message of this process into the queue.
@@ -280,21 +270,14 @@ class Subscription(Entity, Generic[M]):
             except IndexError:
                 return
 
-    def _await_live(self, item: _Item) -> None:
+    def _await_live(self, item: _Item, then: Callable[[_Item], object] = lambda _: None) -> None:
         """Wait for the live samples up to a replayed one that was published since the start."""
         deadline = time.monotonic() + _LIVE_SECONDS
-        while self._waits_for(*item) and not self._queue.closed and time.monotonic() < deadline:
+        while _is_ahead(*item, self._history.opened):
+            if self._queue.closed or time.monotonic() >= deadline:
+                break
             time.sleep(_POLL_SECONDS)
-
-    def _waits_for(self, sample: AnySample, decoder: SampleDecoder | None) -> bool:
-        """Return whether live samples are missing up to a replayed one."""
-        if decoder is None or not isinstance(sample, Reply):
-            return False
-        try:
-            sequence, published, source = read_attachment(sample.attachment or b"")
-        except DecodeError:
-            return False  # whoever decodes the sample reports it
-        return published > self._history.opened and decoder.last(source) < sequence
+        then(item)
 
     def _dispatch(self, sample: AnySample, decoder: SampleDecoder | None = None) -> None:
         """Decode a sample, and call the callback with the message."""
@@ -415,7 +398,7 @@ class Subscription(Entity, Generic[M]):
             decoder.expect_replay(gid(format_token(publisher)))
             # Samples with a lifespan, such as lines of /rosout, are events: late joiners skip them.
             lasting = publisher.qos.lifespan == FOREVER
-            receive = partial(self._receive_replay, decoder)
+            receive = partial(self._receive, decoder=decoder)
             history = _History(receive, self._history.start(lasting=lasting), lasting=lasting)
             self._request_history(publisher, publisher.qos.depth, history.take, history.finish)
 
@@ -483,6 +466,8 @@ class Subscription(Entity, Generic[M]):
 
     def _finish(self) -> None:
         self._queue.close()
+        if self._callback is None and self._queue_worker is not None:
+            self._queue_worker.close()
 
     def _forked(self) -> None:
         self._queue.closed = True
@@ -581,3 +566,14 @@ def _next_sample(ring: PullSubscriber) -> Sample | None:
         return ring.receive()
     except ClosedError:
         return None
+
+
+def _is_ahead(sample: AnySample, decoder: SampleDecoder | None, opened: int) -> bool:
+    """Return whether live samples are missing up to a replayed one that is newer than a time."""
+    if decoder is None or not isinstance(sample, Reply):
+        return False
+    try:
+        sequence, published, source = read_attachment(sample.attachment or b"")
+    except DecodeError:
+        return False  # whoever decodes the sample reports it
+    return published > opened and decoder.last(source) < sequence
