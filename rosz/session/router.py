@@ -24,6 +24,7 @@ from rosz.lifecycle import Closing, Lifecycle
 from rosz.session.config import SessionConfig, ephemeral, keys_of
 from rosz.session.dialling import Dialling, who_answers
 from rosz.session.local_peers import CoreLock, LocalPeers, describe_process, find_holder
+from rosz.session.old_peers import OldPeers
 from rosz.session.opening import outlasted_silence, places_of, settings_text
 from rosz.session.probe import is_listening
 from rosz.session.session import Session
@@ -117,6 +118,7 @@ class Router(_OpenRouter):
         self.endpoints = tuple(place for place in listen if place != ephemeral())
         _check_certificate(config)
         self._dialling = self._lifecycle.keep(Dialling(self.session, config))
+        self._lifecycle.keep(OldPeers(self.session, config))
         if any(_ON_INTERFACE in place for place in listen):
             self._lifecycle.keep(_NewInterfaces(config))
         if self.holder:

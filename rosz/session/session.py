@@ -455,10 +455,11 @@ class Session(Closing):
             )
         return sorted({reply.key for reply in Replies(handler) if reply.ok})
 
-    def peers(self) -> list[str]:
-        """Return the ids of the sessions and routers that this one is linked to."""
+    def peers(self, *, routers: bool = True) -> list[str]:
+        """Return the ids of the peers that this session is linked to, and of the routers."""
         info = self._raw.info
-        return sorted(str(zid) for zid in (*info.peers_zid(), *info.routers_zid()))
+        others = info.routers_zid() if routers else ()
+        return sorted(str(zid) for zid in (*info.peers_zid(), *others))
 
     @property
     def local_endpoint(self) -> str:
