@@ -236,10 +236,12 @@ class TypeNotFound(NotFoundError):
 
     Attributes:
         type_name: Name of the type.
+        reason: Why it is not known; empty if nothing is to be said.
     """
 
     def __init__(self, type_name: str, reason: str = "") -> None:
         self.type_name = type_name
+        self.reason = reason
         super().__init__(f"type '{type_name}' is not known{': ' + reason if reason else ''}")
 
 

@@ -26,6 +26,7 @@ from rosz.errors import ClosedError, EncodeError, NotFoundError, UsageError
 
 if TYPE_CHECKING:
     from rosz.introspect import EchoOptions, Filter, Target, Topic
+    from rosz.message import Message
     from rosz.node import Context, MessageInfo, Node
     from rosz.session import Sample
     from rosz.wire import Token
@@ -206,9 +207,9 @@ def echo_command(call: Call, topic: _TopicOrField, flags: EchoFlags) -> None:
 
     with call.lasting_node(_TOOL) as node:
         target, token = _wait_for(node, topic)
-        to_text = _raw_text(options) if flags.raw else _text(node, target, token, options)
+        cls = None if flags.raw else find_class(node, token)
+        to_text = _raw_text(options) if cls is None else _text(node, target, cls, options)
         printer = _Printer(to_text, 1 if flags.once else flags.count)
-        cls = None if flags.raw else find_class(node.context, token)
         node.subscription(
             target.topic, cls, printer.receive, queue_size=_DEPTH, raw=flags.raw, with_info=True
         )
@@ -219,15 +220,15 @@ def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
     """Wait for a topic, or a field, and return it with a token of the topic."""
     from rosz.introspect import resolve_field, wait_for_target
 
-    return wait_for_target(node.context, resolve_field(name, node.resolve), warn)
+    return wait_for_target(node, resolve_field(name, node.resolve), warn)
 
 
 def _text(
-    node: Node, target: Target, token: Token, options: EchoOptions
+    node: Node, target: Target, cls: type[Message], options: EchoOptions
 ) -> Callable[[Any], str | None]:
-    from rosz.introspect import Echo, find_class
+    from rosz.introspect import Echo
 
-    kind = target.path.type_in(find_class(node.context, token))
+    kind = target.path.type_in(cls)
     return Echo(target.topic, kind, target.path, options, node.now).text
 
 
@@ -325,7 +326,7 @@ def _measure(node: Node, token: Token, tick: Callable[[], None], condition: Filt
         if condition.accepts(message, token.name):
             tick()
 
-    cls = find_class(node.context, token)
+    cls = find_class(node, token)
     node.subscription(token.name, cls, receive, queue_size=_DEPTH)
 
 
@@ -360,7 +361,7 @@ def delay_command(
     meter = DelayMeter(_window(window))
     with call.lasting_node(_TOOL) as node:
         target, token = _wait_for(node, topic)
-        cls = find_class(node.context, token)
+        cls = find_class(node, token)
         if not cls._has_header:
             raise NotFoundError(
                 f"'{cls._type}' of topic '{target.topic}' has no header, so its age cannot be told"

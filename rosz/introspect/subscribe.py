@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 
 from rosz import names
-from rosz.errors import DefinitionError, InvalidName, NotFoundError
+from rosz.errors import (
+    DefinitionError,
+    InvalidName,
+    NotFoundError,
+    ServiceError,
+    TypeNotFound,
+    WaitTimeout,
+)
 from rosz.graph import View
 from rosz.introspect.fields import Target, find_target
 from rosz.message import Message
-from rosz.node import Context, Entity, Node
+from rosz.node import Entity, Node
 from rosz.qos import DEFAULT
 from rosz.session import Sample
 from rosz.wire import NO_HASH, Kind, Token, entity_key
+
+_DEFINITION_TIMEOUT = 3.0
 
 
 def resolve_field(name: str, resolve: Callable[[str], str]) -> str:
@@ -41,35 +51,50 @@ def topic_types(view: View) -> Mapping[str, Sequence[str]]:
     return all_types
 
 
-def wait_for_target(
-    context: Context, name: str, warn: Callable[[str], object]
-) -> tuple[Target, Token]:
+def wait_for_target(node: Node, name: str, warn: Callable[[str], object]) -> tuple[Target, Token]:
     """Return the topic or the field of a name, and a token of the topic; wait while there is none.
 
-    The arguments and errors are those of `rosz.introspect.services.wait_for_server`; the name is
-    global, fields and indices included.
+    Args:
+        node: The node that needs it.
+        name: Global name, fields and indices included.
+        warn: Function called with a sentence if it has to wait.
+
+    Raises:
+        ClosedError: The context is shut down meanwhile.
     """
-    load = context.types.message
+    graph = node.context.graph
 
     def find(view: View) -> tuple[Target, Token]:
-        target = find_target(name, topic_types(view), load)
+        types = topic_types(view)
+
+        def load(type_name: str) -> type[Message]:
+            token = next(token for token in view.tokens if token.type_name == type_name)
+            return find_class(node, token)
+
+        target = find_target(name, types, load)
         return target, find_token(view, target.topic, target.type_name)
 
     try:
-        return context.graph.find(find)
+        return graph.find(find)
     except NotFoundError as error:
         warn(f"topic [{name}] does not appear to be published yet ({error})")
-    targets: list[tuple[Target, Token]] = []
+    tried: Mapping[str, Sequence[str]] = {}
+    while True:
+        # No type is loaded while the graph checks the condition: that may take a call of a service.
+        view = graph.wait_for(
+            lambda view: _beginnings(view, name) not in ({}, tried),  # noqa: B023  # called at once
+            threading.TIMEOUT_MAX / 2,
+            f"topic '{name}'",
+        )
+        tried = _beginnings(view, name)
+        with suppress(NotFoundError):
+            return find(view)
 
-    def look(view: View) -> bool:
-        try:
-            targets.append(find(view))
-        except NotFoundError:
-            return False
-        return True
 
-    context.graph.wait_for(look, threading.TIMEOUT_MAX / 2, f"topic '{name}'")
-    return targets[-1]
+def _beginnings(view: View, name: str) -> Mapping[str, Sequence[str]]:
+    """Return the types of the topics that a name may begin with."""
+    types = topic_types(view)
+    return {topic: types[topic] for topic in types if f"{name}/".startswith(f"{topic}/")}
 
 
 def find_token(view: View, topic: str, type_name: str) -> Token:
@@ -84,22 +109,41 @@ def find_token(view: View, topic: str, type_name: str) -> Token:
     raise NotFoundError(f"topic '{topic}' is gone")
 
 
-def find_class(context: Context, token: Token) -> type[Message]:
+def find_class(node: Node, token: Token) -> type[Message]:
     """Return the class of the messages that a publisher sends or a subscription expects.
 
+    Where its definition is missing here, or is another one, its node is asked for it.
+
     Raises:
-        TypeNotFound: The type is not known here.
-        DefinitionError: Its definition here differs from the one there, or is not well-formed.
+        TypeNotFound: The type is not known here, and the node did not send its definition.
+        DefinitionError: Its definition here is another one, and the node did not send its own.
     """
-    cls = context.types.message(token.type_name)
-    if token.type_hash not in {cls._type_hash, NO_HASH}:
-        raise DefinitionError(
-            f"'{cls._type}' has another definition at node {token.node_name}: its hash there is"
-            f" {token.type_hash}, here it is {cls._type_hash}; put the same definition on"
-            " ROSZ_PACKAGE_PATH here, or look with --raw",
-            token.name,
+    cls: type[Message] | None = None
+    try:
+        cls = node.context.types.message(token.type_name)
+    except TypeNotFound as error:
+        reason = error.reason
+    except DefinitionError as error:
+        reason = str(error)
+    else:
+        if token.type_hash in {cls._type_hash, NO_HASH}:
+            return cls
+        reason = f"its hash there is {token.type_hash}, here it is {cls._type_hash}"
+    from rosz.node.ros2 import request_type  # few commands need it
+
+    try:
+        return request_type(node, token, _DEFINITION_TIMEOUT)
+    except (NotFoundError, DefinitionError, ServiceError, WaitTimeout) as error:
+        advice = (
+            f"{token.node_name} did not send its definition ({error}): put it on ROSZ_PACKAGE_PATH"
+            " here, or look with --raw"
         )
-    return cls
+        if cls is None:
+            raise TypeNotFound(token.type_name, f"{reason}; {advice}") from error
+        raise DefinitionError(
+            f"'{cls._type}' has another definition at node {token.node_name}: {reason}; {advice}",
+            token.name,
+        ) from error
 
 
 def subscribe_samples(

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from rosz import names
-from rosz.errors import ClosedError
+from rosz.errors import ClosedError, TypeNotFound
 from rosz.interrupts import InterruptDeferral
 from rosz.node import control, signals, standard
 from rosz.node.client import Client
@@ -180,8 +180,9 @@ class Node(NodeCore):
 
         Args:
             topic: Name of the topic; resolved and remapped.
-            message_type: Class of the messages, or its name, such as ``std_msgs/String``; when not
-                given, every type is received, and decoded by the definition known here.
+            message_type: Class of the messages, or its name, such as ``std_msgs/String``; where its
+                definition is not known here, a publisher's node is asked for it. When not given,
+                every type is received, and decoded by the definition known here.
             callback: Function that gets each message, on a thread of the subscription, one at a
                 time. Without one, iterate over the subscription or call its ``get``.
             queue_size: Number of newest samples that wait for their turn; older ones are dropped.
@@ -194,8 +195,10 @@ class Node(NodeCore):
         Raises:
             InvalidName: The name is not legal.
             UsageError: The size of the queue is not valid.
-            TypeNotFound: There is no type of that name.
+            TypeNotFound: There is no type of that name, neither here nor at a publisher.
             DefinitionError: A definition in the package of the type is not well-formed.
+            ServiceError: The publisher's node ended before it sent the definition.
+            WaitTimeout: The publisher's node did not send the definition.
             ClosedError: The node is closed.
         """
         name, history = self.resolve(topic), qos is None
@@ -206,7 +209,7 @@ class Node(NodeCore):
                     self, name, callback, qos, raw=raw, with_info=with_info, history=history
                 )
             )
-        kind = self._message_class(message_type)
+        kind = self._message_class(message_type, name)
         return self.keep(
             Subscription(
                 self, name, kind, callback, qos, raw=raw, with_info=with_info, history=history
@@ -382,10 +385,21 @@ class Node(NodeCore):
         self.context.cooperative = True
         return self.clock.sleep(nanoseconds(seconds, "a sleep"))
 
-    def _message_class(self, message_type: type[M] | str) -> type[M | Any]:
-        if isinstance(message_type, str):
+    def _message_class(self, message_type: type[M] | str, topic: str = "") -> type[M | Any]:
+        """Return the class of a type, by the definition of a publisher of the topic if need be."""
+        if not isinstance(message_type, str):
+            return message_type
+        try:
             return self.context.types.message(message_type)
-        return message_type
+        except TypeNotFound:
+            publishers = self.context.graph.refresh().publishers(topic) if topic else []
+            wanted = names.short_type(message_type)
+            for token in publishers:
+                if names.short_type(token.type_name) == wanted:
+                    from rosz.node.ros2 import request_type  # rarely needed
+
+                    return request_type(self, token)
+            raise
 
 
 class BridgedNode(NodeCore):

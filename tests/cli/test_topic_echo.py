@@ -4,6 +4,7 @@ import re
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from network import TIMEOUT, Network
@@ -116,6 +117,30 @@ def test_another_definition_is_reported(shell: Shell, talker: Node) -> None:
     assert result.code == 1
     assert "'std_msgs/String' has another definition at node /talker" in result.err
     assert shell("topic", "echo", "-n", "1", "--raw", "/strange").code == 0
+
+
+def test_a_type_that_only_the_publisher_knows(
+    network: Network, shell: Shell, tmp_path: Path
+) -> None:
+    """Its node is asked for the definition, also where the topic comes later than the command."""
+    folder = tmp_path / "src" / "odd_msgs"
+    (folder / "msg").mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>odd_msgs</name></package>")
+    (folder / "msg" / "Part.msg").write_text("float64 weight\n")
+    (folder / "msg" / "Thing.msg").write_text("Part part\nstring[] labels\n")
+    echo = network.run("-m", "rosz", "topic", "echo", "-n", "1", "/thing/part/weight")
+    echo.wait_for("does not appear to be published yet")
+    knowing = network.node("knowing", context=network.context(package_roots=(tmp_path / "src",)))
+    part = knowing.context.types.message("odd_msgs/Part")(2.5)
+    knowing.publisher("thing", "odd_msgs/Thing", latch=True).publish(part=part, labels=["a"])
+    assert echo.exit_code() == 0, echo.output
+    assert echo.lines[-2:] == ["2.5", "---"]
+    result = shell("topic", "echo", "-n", "1", "/thing")
+    assert result.out == "part: \n  weight: 2.5\nlabels: \n  - a\n---\n"
+    rate = network.run("-m", "rosz", "topic", "hz", "--filter", "m.part.weight > 2", "/thing")
+    rate.wait_for("subscribed to [/thing]")
+    rate.send(signal.SIGINT)
+    assert rate.exit_code() == 0
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from rosz.introspect.survey import take_survey
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
-from rosz.node import Context
+from rosz.node import Context, Node
 from rosz.session import Session
 
 SEND = """
@@ -47,10 +47,10 @@ def context(network: Network, monkeypatch: pytest.MonkeyPatch) -> Context:
 
 
 def test_what_a_query_lacks_is_found(context: Context) -> None:
-    target, token = wait_for_target(context, "/scan", pytest.fail)
-    assert (target.topic, token.node_name) == ("/scan", "/robot")
     assert wait_for_server(context, "/reset", pytest.fail).node_name == "/robot"
     assert view_of_action(context, "/count").nodes() == ["/robot"]
+    target, token = wait_for_target(Node("tool", context=context), "/scan", pytest.fail)
+    assert (target.topic, token.node_name) == ("/scan", "/robot")
 
 
 def test_what_is_not_there_is_not_found(context: Context) -> None:

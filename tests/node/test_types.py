@@ -106,6 +106,16 @@ def test_type_from_another_node(network: Network, knowing: Node) -> None:
     eventually(lambda: len(node._lifecycle._parts) <= parts, "no client is left")
 
 
+def test_subscription_by_a_name_that_the_publisher_knows(network: Network, knowing: Node) -> None:
+    knowing.publisher("grips", "gripper_msgs/Grip", latch=True).publish(label="firm")
+    node = network.node("other")
+    publisher_token(node, "/grips")
+    for name in ("gripper_msgs/Grip", "gripper_msgs/msg/Grip"):
+        assert node.subscription("grips", name).get(TIMEOUT).label == "firm"
+    with pytest.raises(TypeNotFound, match="there is no package 'gripper_msgs'"):
+        node.subscription("grips", "gripper_msgs/Part")
+
+
 def test_service_type_from_another_node(network: Network, knowing: Node) -> None:
     knowing.service("close", knowing.context.types.service("gripper_msgs/Close"), lambda _: [True])
     node = network.node("bridge")

@@ -132,7 +132,7 @@ def _find(node: Node, name: str, *, wait: bool) -> Target:
     context, name = node.context, resolve_field(name, node.resolve)
     if wait:
         text = f"WARNING: topic [{name}] does not appear to be published yet\n"
-        return wait_for_target(context, name, lambda _: sys.stderr.write(text))[0]
+        return wait_for_target(node, name, lambda _: sys.stderr.write(text))[0]
     return context.graph.find(
         lambda view: find_target(name, topic_types(view), context.types.message)
     )

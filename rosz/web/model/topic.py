@@ -119,7 +119,7 @@ class TopicWatch:
         self._sizes = BandwidthMeter()
         self._ages = DelayMeter(window=100)
         self._delay: DelayStats | None = None
-        cls = find_class(node.context, token)
+        cls = find_class(node, token)
         self._stamped: bool = cls._has_header
         self._decode = node.context.decoder(cls)
         self._subscription = node.subscription(

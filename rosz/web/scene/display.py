@@ -252,7 +252,7 @@ class ReceivingDisplay(Display):
         token = find_token(survey.view, topic, topic_types(survey.view).get(topic, ("",))[0])
         super().__init__(look, short_type(token.type_name))
         self._node = node
-        self._cls: Any = find_class(node.context, token)
+        self._cls: Any = find_class(node, token)
         self._frames = frames
 
 
