@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rosz.errors import (
@@ -20,7 +23,7 @@ from rosz.node.entity import Entity
 from rosz.node.incompatible import explain_incompatible
 from rosz.qos import QoS
 from rosz.session import Cancellation, Reply, clamp_timeout
-from rosz.wire import Kind, pack_attachment
+from rosz.wire import Kind, Token, is_rosz_id, pack_attachment
 
 if TYPE_CHECKING:
     from rosz.graph import View
@@ -39,9 +42,19 @@ _SAME = 0.001
 _GRACE = 1.0
 """Seconds to wait for a server that the graph does not show yet."""
 
+_ANY_NUMBER = 1 << 30
+_TAKEN_AT_ONCE = "/_action/get_result"
+"""The service whose requests wait elsewhere, until the goal has ended."""
+_DEFAULT_DEPTH = 10
+"""The number of requests that wait at a server of ROS 2, if its token does not tell."""
+
 
 class Client(Entity):
-    """Call a service; see `rosz.Node.client`. Any number of threads may call at once."""
+    """Call a service; see `rosz.Node.client`. Any number of threads may call at once.
+
+    A server of ROS 2 drops the oldest request when more of them wait than the depth of its QoS. So
+    no more calls than that are on their way to one at any time; others wait for their turn.
+    """
 
     def __init__(
         self, node: NodeCore, name: str, service_type: type[ServiceType], qos: QoS, timeout: float
@@ -54,7 +67,9 @@ class Client(Entity):
         self._decode = node.context.decoder(service_type.Response)
         self._numbers = itertools.count(1)
         self._cancel = Cancellation()
-        self._known: tuple[View | None, bool] = None, False
+        self._known: tuple[View | None, bool, int] = None, False, _ANY_NUMBER
+        self._on_their_way = 0
+        self._turn = threading.Condition()
         self._querier = self.keep(
             node.context.session.querier(self.key, timeout=self.timeout, target="all_complete")
         )
@@ -84,8 +99,8 @@ class Client(Entity):
         Raises:
             EncodeError: A field of the request has a value that does not fit.
             ServiceNotFound: No node serves the service.
-            ServiceError: The server responded with an error, or ended before it responded. All
-                servers get the request, and the first response counts.
+            ServiceError: The server responded with an error, dropped the request, or ended before
+                it responded. All servers get the request, and the first response counts.
             WaitTimeout: No response came in time.
             ClosedError: The client or its context was closed meanwhile.
             UsageError: The timeout is not a number.
@@ -95,18 +110,46 @@ class Client(Entity):
         payload = self.service_type.Request._encode(request)
         if not self.served:
             self._find_server(limit)
-        for _ in range(_ATTEMPTS):
-            began = time.monotonic()
-            reply = self._attempt(payload, deadline, limit)
-            if reply is not None:
-                return self._response(reply, limit)
-            # The query reached nobody: the route to a server may come a moment after its token.
-            # A server that got the request and then ended may have done the work: it does not get
-            # the request again.
-            if time.monotonic() - began > _AT_ONCE or not self.served:
-                break
-            time.sleep(_PAUSE)
-        raise ServiceError(f"service [{self.name}]: the server ended before it answered")
+        with self._taking_turns(deadline, limit):
+            for _ in range(_ATTEMPTS):
+                began = time.monotonic()
+                reply = self._attempt(payload, deadline, limit)
+                if reply is not None:
+                    return self._response(reply, limit)
+                # The query reached nobody: the route to a server may come a moment after its token.
+                # A server that got the request and then ended may have done the work: it does not
+                # get the request again.
+                if time.monotonic() - began > _AT_ONCE or not self.served:
+                    break
+                time.sleep(_PAUSE)
+        raise ServiceError(f"service [{self.name}]: {self._why_no_answer()}")
+
+    @contextmanager
+    def _taking_turns(self, deadline: float, limit: float) -> Iterator[None]:
+        """Return a context for one call, which begins when the servers have room for it."""
+        with self._turn:
+            while self._on_their_way >= self._known[2]:
+                left = deadline - time.monotonic()
+                if left <= 0 or not self._turn.wait(left):
+                    raise self._late(limit)
+                self.check_open("call")
+            self._on_their_way += 1
+        try:
+            yield
+        finally:
+            with self._turn:
+                self._on_their_way -= 1
+                self._turn.notify()
+
+    def _why_no_answer(self) -> str:
+        view = self.others.view()
+        for server in view.servers(self.name):
+            if self.matches(server) and not is_rosz_id(server.zid):
+                return (
+                    f"{server.node_name} dropped the request unanswered: it keeps the newest"
+                    f" {_room(server)} that wait, and other clients have sent more; call again"
+                )
+        return "the server ended before it answered"
 
     def _attempt(self, payload: bytes, deadline: float, limit: float) -> Reply | None:
         """Send the request once; ``None`` if the query ended without a reply."""
@@ -156,10 +199,11 @@ class Client(Entity):
         """Whether a node serves the service with this type, as far as it is known."""
         # Each view is looked at once.
         view = self.others.view()
-        seen, served = self._known
+        seen, served, _ = self._known
         if seen is not view:
-            served = any(map(self.matches, view.servers(self.name)))
-            self._known = view, served
+            servers = [*filter(self.matches, view.servers(self.name))]
+            served = bool(servers)
+            self._known = view, served, min(map(_room, servers), default=_ANY_NUMBER)
         return served
 
     def _find_server(self, limit: float) -> None:
@@ -205,3 +249,14 @@ class Client(Entity):
 
     def _finish(self) -> None:
         self._cancel.cancel()
+        with self._turn:
+            self._turn.notify_all()
+
+
+def _room(server: Token) -> int:
+    """Return the number of requests that may wait at a server before it drops any."""
+    if is_rosz_id(server.zid) or server.name.endswith(_TAKEN_AT_ONCE):
+        return _ANY_NUMBER
+    if server.qos is None:
+        return _DEFAULT_DEPTH
+    return _ANY_NUMBER if server.qos.history == "keep_all" else server.qos.depth
