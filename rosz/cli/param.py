@@ -51,6 +51,7 @@ app = App("Get and set parameters.", is_remapping=_is_special)
 _Verbose = Annotated[bool, Option("-v", "Print each step.")]
 _Name = Annotated[str, Argument("NAME", source=suggest.params)]
 _Space = Annotated[str, Argument("NAMESPACE", source=suggest.params)]
+_Gone = Annotated[bool, Option("--gone", "Only those below names of nodes that are not alive.")]
 
 
 @app.command("list")
@@ -60,12 +61,14 @@ def list_command(
         str | None, Argument("NAMESPACE", "Lists all if omitted.", suggest.params)
     ] = None,
     *,
+    gone: _Gone = False,
     json: Json = False,
 ) -> None:
     """List parameters."""
     with _client(call) as client:
+        names = _gone_names(call, client, namespace) if gone else client.names()
         space = "/" if namespace is None else _resolve(call, namespace).rstrip("/") + "/"
-        inside = [name for name in client.names() if name.startswith(space)]
+        inside = [name for name in names if name.startswith(space)]
     print_result(["\n".join(inside)], inside, as_json=json)
 
 
@@ -127,13 +130,77 @@ def set_command(
 
 
 @app.command("delete")
-def delete_command(call: Call, name: _Name, *, verbose: _Verbose = False) -> None:
+def delete_command(
+    call: Call,
+    name: Annotated[
+        str | None, Argument("NAME", "With --gone, it may be omitted.", suggest.params)
+    ] = None,
+    *,
+    gone: _Gone = False,
+    yes: Annotated[bool, Option("-y --yes", "With --gone, do not ask.")] = False,
+    verbose: _Verbose = False,
+) -> int:
     """Delete a parameter and all parameters below it."""
+    if name is None and not gone:
+        raise UsageError("no parameter is given; expected a NAME, or --gone")
+    if yes and not gone:
+        raise UsageError("--yes is for --gone: deleting a parameter by its name asks nothing")
     with _client(call, "parameter") as client:
-        full = _resolve(call, name)
+        if gone:
+            return _delete_gone(call, client, name, yes=yes, verbose=verbose)
+        full = _resolve(call, name or "")
         _warn_slow(client, client.delete(full))
     what = "ENTIRE parameter server" if full == "/" else f"parameter [{full}]"
     _log(verbose, [f"deleted {what}"])
+    return 0
+
+
+def _delete_gone(
+    call: Call, client: ParamClient, namespace: str | None, *, yes: bool, verbose: bool
+) -> int:
+    """Delete the parameters of nodes that are gone, once the user has agreed."""
+    from rosz.params import DELETED, split
+
+    names = _gone_names(call, client, namespace)
+    if call.incomplete:
+        raise UsageError(
+            "not all machines are reached, so nodes there may be alive; nothing is deleted"
+        )
+    if names and not yes:
+        if not sys.stdin.isatty():
+            raise UsageError(
+                f"{len(names)} parameters would be deleted, and nobody can be asked: look at"
+                " 'rosz param list --gone', then give --yes"
+            )
+        print_lines(names)
+        print_error(
+            "No node with the beginning of these names is alive. Parameters that several nodes"
+            " share look the same."
+        )
+        sys.stderr.write(f"Delete these {len(names)} parameters? [y/N] ")
+        sys.stderr.flush()
+        if sys.stdin.readline().strip().lower() not in {"y", "yes"}:
+            print_error("nothing is deleted")
+            return 1
+    _warn_slow(client, client.write([(split(name), DELETED) for name in names]))
+    _log(verbose, (f"deleted parameter [{name}]" for name in names))
+    return 0
+
+
+def _gone_names(call: Call, client: ParamClient, namespace: str | None) -> list[str]:
+    """Return the parameters below names of nodes of which none is alive.
+
+    A parameter in the root belongs to no node.
+    """
+    space = "/" if namespace is None else _resolve(call, namespace).rstrip("/") + "/"
+    alive = {f"{token.node_name}/" for token in call.survey().view.tokens}
+    return [
+        name
+        for name in client.names()
+        if name.startswith(space)
+        and name.count("/") > 1
+        and not any(name.startswith(node) for node in alive)
+    ]
 
 
 @app.command("dump")

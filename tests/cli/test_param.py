@@ -21,6 +21,7 @@ from params.network import Network
 
 from rosz.cli.main import run
 from rosz.cli.param import _format_scalar, _parse_scalar
+from rosz.node import Node
 from rosz.params.replica import Replica
 from rosz.params.yaml import format_get, load, pretty
 
@@ -505,3 +506,57 @@ def test_no_word_means_something_else_in_yaml(word: str) -> None:
     found = _parse_scalar(word)
     if found is not None:
         assert (type(found), found) == (type(load(word)), load(word))
+
+
+class Terminal(io.TextIOWrapper):
+    """Standard input of a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_parameters_of_nodes_that_are_gone(
+    replica: Replica, param: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = Node("alive")
+    try:
+        for name in ("/root", "/alive/rate", "/alive/pid/p", "/alive2/rate", "/gone/pid/p"):
+            replica.set(name, 1)
+        replica.set("/robot/gone/rate", 2)
+        left = ["/alive2/rate", "/gone/pid/p", "/robot/gone/rate"]
+
+        def listed() -> list[str]:
+            code, out, err = param("list", "--gone")
+            assert (code, err) == (0, "")
+            return out.split()
+
+        eventually(lambda: listed() == left, "the node")
+        assert param("list", "--gone", "/robot") == (0, "/robot/gone/rate\n", "")
+
+        code, _, err = param("delete", "--gone")
+        assert code == 2
+        assert "3 parameters would be deleted" in err
+        monkeypatch.setattr(io, "TextIOWrapper", Terminal)
+        code, out, err = param("delete", "--gone", stdin="no\n")
+        assert (code, out.split()) == (1, left)
+        assert "Delete these 3 parameters? [y/N] nothing is deleted" in err
+        assert listed() == left
+        code, out, err = param("delete", "--gone", "/robot", stdin="y\n")
+        assert (code, out.split()) == (0, left[2:])
+        assert listed() == left[:2]
+        code, out, err = param("delete", "--gone", "-y", "-v")
+        assert (code, err) == (0, "")
+        assert out.splitlines() == [f"deleted parameter [{name}]" for name in left[:2]]
+        assert listed() == []
+        for name in ("/root", "/alive/rate", "/alive/pid/p"):
+            assert replica.get(name) == 1
+    finally:
+        node.close()
+        node.context.close()
+
+
+@pytest.mark.parametrize("line", ["delete", "delete /x -y"])
+def test_what_is_to_be_deleted_must_be_clear(param: Command, line: str) -> None:
+    code, out, err = param(*line.split())
+    assert (code, out) == (2, "")
+    assert "--gone" in err
