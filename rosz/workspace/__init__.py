@@ -30,19 +30,3 @@ else:
             "problem": "Problem",
         },
     )
-
-__all__ = (
-    "LICENSES",
-    "AmentPackage",
-    "Checked",
-    "Generator",
-    "Migration",
-    "Problem",
-    "check",
-    "create",
-    "editor_folder",
-    "find_packages",
-    "migrate",
-    "write_setup",
-    "write_stubs",
-)

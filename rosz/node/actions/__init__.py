@@ -40,27 +40,3 @@ else:
             "watch": "LONGEST_SILENCE ServerWatch",
         },
     )
-
-__all__ = (
-    "ACTIONLIB_STEPS",
-    "CANCEL",
-    "FEEDBACK",
-    "FINAL",
-    "LONGEST_SILENCE",
-    "RESULT",
-    "RUNNING",
-    "SEND",
-    "STATUS",
-    "TERMINAL",
-    "TO_ACTIONLIB",
-    "TO_ROS2",
-    "ActionClient",
-    "ActionServer",
-    "ActionlibState",
-    "ClientGoal",
-    "GoalServer",
-    "GoalState",
-    "ServerGoal",
-    "ServerOptions",
-    "ServerWatch",
-)
