@@ -185,6 +185,13 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         " shutdown try_shutdown",
     },
     "rclpy.wait_for_message": {"rclpy.program": "wait_for_message"},
+    "rosidl_runtime_py.convert": {
+        "rosidl_runtime_py": "message_to_csv message_to_ordereddict message_to_yaml",
+    },
+    "rosidl_runtime_py.set_message": {"rosidl_runtime_py": "set_message_fields"},
+    "rosidl_runtime_py.utilities": {
+        "rosidl_runtime_py": "get_action get_interface get_message get_service",
+    },
     "ros_numpy.geometry": {
         "ros_numpy": "Point Pose Quaternion Transform Vector3 converts_from_numpy"
         " converts_to_numpy np numpy_to_point numpy_to_pose numpy_to_quat numpy_to_transform"
@@ -333,6 +340,7 @@ MODULES: Mapping[str, Module] = {
     "ament_index_python": Module("ros2.ament_index_python"),
     "rclpy": Module("ros2.rclpy"),
     "rosgraph.impl.graph": Module("ros1.tools.rosgraph.graph"),
+    "rosidl_runtime_py": Module("ros2.rosidl_runtime_py"),
     "rospy.exceptions": Module("ros1.exceptions"),
     "sensor_msgs.point_cloud2": Module("ros1.client.point_cloud2"),
     "sensor_msgs_py": Module("ros2.sensor_msgs_py", extras=_NUMPY),

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosz.cli.console import print_lines
 from rosz.cli.ros2.graph import CommandFailed, open_node
-from rosz.cli.ros2.messages import FILL_ERRORS, fill, read_values, to_repr, to_yaml
 from rosz.errors import GoalFailed, GoalRejected, RoszError, TypeNotFound
+from rosz.ros2.rosidl_runtime_py import FILL_ERRORS, fill, to_repr, to_yaml
 
 if TYPE_CHECKING:
     from rosz.node import Client
@@ -19,6 +19,20 @@ if TYPE_CHECKING:
 _FOREVER = threading.TIMEOUT_MAX / 2
 _AT_ONCE = 1.0
 _CANCEL_SECONDS = 10.0
+
+
+def read_values(text: str) -> Any:
+    """Return the values of a message that are given on a command line.
+
+    Raises:
+        CommandFailed: The text is not YAML.
+    """
+    import yaml
+
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise CommandFailed(f"the values are not YAML: {' '.join(str(error).split())}") from error
 
 
 def _values(given: Namespace) -> Any:

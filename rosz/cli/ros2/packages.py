@@ -78,7 +78,7 @@ def interface_packages(given: Namespace) -> None:
 
 def prototype(given: Namespace) -> str | None:
     """Print the default values of a type."""
-    from rosz.cli.ros2.messages import to_yaml
+    from rosz.ros2.rosidl_runtime_py import to_yaml
 
     package, *middle, base = given.type.split("/")
     kind = middle[0] if middle else "msg"

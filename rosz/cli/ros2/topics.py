@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING, Any, Self
 import msgspec
 
 from rosz.cli.console import print_lines
+from rosz.cli.ros2.calls import read_values
 from rosz.cli.ros2.graph import CommandFailed, open_node, wait_until
-from rosz.cli.ros2.messages import (
+from rosz.errors import ClosedError, RoszError
+from rosz.qos import DEFAULT, PARAMETERS, ROSOUT, SENSOR_DATA, QoS
+from rosz.ros2.rosidl_runtime_py import (
     FILL_ERRORS,
     Limits,
     fill,
-    read_values,
     to_csv,
     to_plain,
     to_repr,
     to_yaml,
 )
-from rosz.errors import ClosedError, RoszError
-from rosz.qos import DEFAULT, PARAMETERS, ROSOUT, SENSOR_DATA, QoS
 
 if TYPE_CHECKING:
     from rosz.node import Context, MessageInfo, Node
@@ -448,7 +448,7 @@ def publish(given: Namespace) -> str | None:
         count, due = 0, time.monotonic()
         while True:
             for stamp in stamps:
-                stamp(node.now())
+                stamp.sec, stamp.nanosec = divmod(node.now(), 1_000_000_000)
             count += 1
             if given.print and count % given.print == 0:
                 print_lines([f"publishing #{count}: {to_repr(message)}\n"])

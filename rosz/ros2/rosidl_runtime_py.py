@@ -1,14 +1,18 @@
-"""Messages as ROS 2's commands print and fill them (rosidl_runtime_py, rosidl_generator_py)."""
+"""rosidl_runtime_py: messages as text, filled from values, and their classes by name.
+
+The texts are those that ROS 2's commands print.
+"""
 
 from __future__ import annotations
 
 import sys
 from array import array
-from collections.abc import Callable, Iterator
+from collections import OrderedDict
+from collections.abc import Iterator
 from functools import cache
+from importlib import import_module
 from typing import Any, NamedTuple
 
-from rosz.cli.ros2.graph import CommandFailed
 from rosz.errors import MessageError
 from rosz.message import ARRAY_CODES, Message, Slot, shown_name, slots
 from rosz.time import TimeValue
@@ -50,6 +54,85 @@ def _fields(message: Message) -> Iterator[tuple[Slot, str, Any]]:
         elif isinstance(value, bytes):
             value = memoryview(value)  # a sequence of numbers, which is cut without a copy
         yield slot, shown_name(slot.name), value
+
+
+def message_to_yaml(
+    msg: Message,
+    *,
+    truncate_length: int | None = None,
+    no_arr: bool = False,
+    no_str: bool = False,
+    flow_style: bool = False,
+) -> str:
+    """Return a message as YAML.
+
+    Args:
+        msg: The message.
+        truncate_length: Most items of an array, and letters of a text; all when not given.
+        no_arr: Whether to show the types and lengths of arrays only.
+        no_str: Whether to show the lengths of texts only.
+        flow_style: Whether lists are written in brackets.
+    """
+    return to_yaml(msg, Limits(truncate_length, no_arr, no_str), flow=flow_style)
+
+
+def message_to_ordereddict(msg: Message, **options: Any) -> dict[str, Any]:
+    """Return a message as a dictionary; the options are those of `message_to_csv`."""
+    plain: dict[str, Any] = to_plain(msg, _limits(**options))
+    return OrderedDict(plain)
+
+
+def message_to_csv(msg: Message, **options: Any) -> str:
+    """Return the values of a message with commas between them.
+
+    Args:
+        msg: The message.
+        options: ``truncate_length``, ``no_arr`` and ``no_str``, as of `message_to_yaml`.
+    """
+    return to_csv(msg, _limits(**options))
+
+
+def _limits(
+    truncate_length: int | None = None, no_arr: bool = False, no_str: bool = False
+) -> Limits:
+    return Limits(truncate_length, no_arr, no_str)
+
+
+def set_message_fields(
+    msg: Message,
+    values: dict[str, Any],
+    expand_header_auto: bool = False,
+    expand_time_now: bool = False,
+) -> list[Any]:
+    """Set fields of a message from a dictionary; see `fill`.
+
+    Args:
+        msg: The message.
+        values: Values by field.
+        expand_header_auto: Whether ``auto`` stands for a header with the time.
+        expand_time_now: Whether ``now`` stands for the time.
+
+    Returns:
+        The times in the message that the caller has to set.
+    """
+    return fill(msg, values, stamped=expand_header_auto or expand_time_now)
+
+
+def get_interface(identifier: str) -> Any:
+    """Return the class of ``std_msgs/msg/String``, of a service or of an action.
+
+    Raises:
+        ValueError: The text is not such a name.
+        ModuleNotFoundError: There is no such package, or it has no interfaces of that kind.
+        AttributeError: The package has no such interface.
+    """
+    parts = identifier.split("/")
+    if len(parts) != len(("package", "kind", "name")) or not all(parts):
+        raise ValueError(f"expected the full name of an interface, got '{identifier}'")
+    return getattr(import_module(f"{parts[0]}.{parts[1]}"), parts[2])
+
+
+get_message = get_service = get_action = get_interface
 
 
 def to_yaml(value: Any, limits: Limits = _NO_LIMITS, *, flow: bool = False) -> str:
@@ -154,21 +237,7 @@ def _array_repr(slot: Slot, value: Any) -> str:
     return to_repr(value)
 
 
-def read_values(text: str) -> Any:
-    """Return the values of a message that are given on a command line.
-
-    Raises:
-        CommandFailed: The text is not YAML.
-    """
-    import yaml
-
-    try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise CommandFailed(f"the values are not YAML: {' '.join(str(error).split())}") from error
-
-
-def fill(message: Message, values: Any, *, stamped: bool = False) -> list[Callable[[int], None]]:
+def fill(message: Message, values: Any, *, stamped: bool = False) -> list[Any]:
     """Set fields of a message from a dictionary, in the way of ``set_message_fields``.
 
     Args:
@@ -177,7 +246,7 @@ def fill(message: Message, values: Any, *, stamped: bool = False) -> list[Callab
         stamped: Whether ``auto`` is a header with the time, and ``now`` a time.
 
     Returns:
-        Functions that set these times to one in nanoseconds.
+        These times, which the caller has to set.
 
     Raises:
         AttributeError: The message has no such field.
@@ -185,14 +254,14 @@ def fill(message: Message, values: Any, *, stamped: bool = False) -> list[Callab
         ValueError: A text is not a number.
         MessageError: A number is out of its range.
     """
-    stamps: list[Callable[[int], None]] = []
+    stamps: list[Any] = []
     _Filler(stamps, stamped).fill(message, values)
     type(message)._encode(message)
     return stamps
 
 
 class _Filler(NamedTuple):
-    stamps: list[Callable[[int], None]]
+    stamps: list[Any]
     stamped: bool
 
     def fill(self, message: Any, values: Any) -> None:
@@ -225,7 +294,7 @@ class _Filler(NamedTuple):
         message = before if value in ("auto", "now") and before is not None else kind()
         timed = message if value == "now" else getattr(message, "stamp", None)
         if self.stamped and value in ("auto", "now") and isinstance(timed, TimeValue):
-            self.stamps.append(lambda now: _set_time(timed, now))
+            self.stamps.append(timed)
         else:
             self.fill(message, value)
         return message
@@ -235,10 +304,6 @@ class _Filler(NamedTuple):
             return array(ARRAY_CODES[kind], value)
         items = [self._one(kind, each) for each in value]
         return bytes(items) if kind in {"byte", "char", "uint8"} else items
-
-
-def _set_time(time: Any, now: int) -> None:
-    time.sec, time.nanosec = divmod(now, 1_000_000_000)
 
 
 FILL_ERRORS = (AttributeError, TypeError, ValueError, MessageError, OverflowError)
