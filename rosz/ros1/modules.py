@@ -390,14 +390,17 @@ _VALUES = (str, bytes, int, float, tuple, list, dict, set, frozenset, MethodType
 """Types of constants, and of the functions of command lines, which are methods of a `Tool`."""
 
 
+def home_of(name: str) -> str:
+    """Return the module of rosz that a name in the tables of `MODULES` stands for."""
+    root, dot, below = name.partition(".")
+    return f"rosz.{MODULES[root].home}{dot}{below}" if root != "rosz" else name
+
+
 def submodule(name: str) -> ModuleType:
     """Build a module of `MODULES` that is no file, such as ``rospy.impl.tcpros``."""
     module = ModuleType(name, f"``{name}``: names that programs import from here.")
     for home, names in MODULES[name].names.items():
-        root, dot, below = home.partition(".")
-        defined = import_module(
-            f"rosz.{MODULES[root].home}{dot}{below}" if root != "rosz" else home
-        )
+        defined = import_module(home_of(home))
         for each in defined.__all__ if names == "*" else names.split():
             public, _, own = each.partition("=")
             setattr(module, public, getattr(defined, own or public))

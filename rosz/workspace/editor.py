@@ -17,7 +17,7 @@ import msgspec
 from rosz.environment import Environment, package_index
 from rosz.errors import RoszError
 from rosz.packages import PackageIndex
-from rosz.ros1.modules import MODULES
+from rosz.ros1.modules import MODULES, home_of
 from rosz.ros1.python_setup import Offers, is_module
 from rosz.typestore import Kind, TypeStore, shipped_packages, shipped_types
 
@@ -67,7 +67,8 @@ def _of_rosz() -> Iterator[tuple[str, str]]:
     """Yield a stub for each ROS 1 and rclpy module that rosz has."""
     built = {
         name: "".join(
-            f"from rosz.{home} import {own or public} as {public}\n"
+            f"from {home_of(home)} import "
+            + ("*\n" if public == "*" else f"{own or public} as {public}\n")
             for home, names in module.names.items()
             for public, _, own in (each.partition("=") for each in names.split())
         )
