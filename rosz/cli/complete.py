@@ -1,8 +1,8 @@
 """Complete a command line: ``rosz complete SHELL LINE``, which the TAB key of a shell runs.
 
-It prints one candidate per line. It prints nothing if there is no candidate, or if an error occurs.
-Candidates from the network that do not arrive within the time limit are left out. The options come
-from the declarations of the commands.
+The output has one candidate per line. It is empty if nothing matches or an error occurs. Candidates
+from the network that do not arrive within the time limit are left out. The options come from the
+declarations of the commands.
 """
 
 from __future__ import annotations

@@ -195,7 +195,7 @@ class Node(NodeCore):
         Raises:
             InvalidName: The name is not legal.
             UsageError: The size of the queue is not valid.
-            TypeNotFound: There is no type of that name, neither here nor at a publisher.
+            TypeNotFound: Neither this machine nor a publisher of the topic has a type of that name.
             DefinitionError: A definition in the package of the type is not well-formed.
             ServiceError: The publisher's node ended before it sent the definition.
             WaitTimeout: The publisher's node did not send the definition.

@@ -329,7 +329,7 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         " toMsg toTf transformations",
     },
 }
-"""Submodules that are no files: they hold names of other modules."""
+"""Submodules without a file of their own. They hold names of other modules."""
 
 MODULES: Mapping[str, Module] = {
     **{
@@ -397,7 +397,7 @@ def home_of(name: str) -> str:
 
 
 def submodule(name: str) -> ModuleType:
-    """Build a module of `MODULES` that is no file, such as ``rospy.impl.tcpros``."""
+    """Build a module of `MODULES` that has no file, such as ``rospy.impl.tcpros``."""
     module = ModuleType(name, f"``{name}``: names that programs import from here.")
     for home, names in MODULES[name].names.items():
         defined = import_module(home_of(home))

@@ -66,12 +66,7 @@ def write_stubs(environment: Environment) -> Stubs:
 def _of_rosz() -> Iterator[tuple[str, str]]:
     """Yield a stub for each ROS 1 and rclpy module that rosz has."""
     built = {
-        name: "".join(
-            f"from {home_of(home)} import "
-            + ("*\n" if public == "*" else f"{own or public} as {public}\n")
-            for home, names in module.names.items()
-            for public, _, own in (each.partition("=") for each in names.split())
-        )
+        name: "".join(_imports(home, names) for home, names in module.names.items())
         for name, module in MODULES.items()
         if not module.home
     }
@@ -89,6 +84,15 @@ def _of_rosz() -> Iterator[tuple[str, str]]:
         text = whole.get(name, "") + "".join(f"from . import {last} as {last}\n" for last in inside)
         path = name.replace(".", "/")
         yield (f"{path}/__init__.py" if inside else f"{path}.py"), text
+
+
+def _imports(home: str, names: str) -> str:
+    """Return the statements that import names of the importer's table from a module."""
+    imported = (
+        "*" if public == "*" else f"{own or public} as {public}"
+        for public, _, own in (each.partition("=") for each in names.split())
+    )
+    return "".join(f"from {home_of(home)} import {each}\n" for each in imported)
 
 
 def _modules_of(root: str, own: str) -> Iterator[tuple[str, str]]:

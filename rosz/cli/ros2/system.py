@@ -156,7 +156,7 @@ def _report() -> None:
 
 
 def daemon_status(_: Namespace) -> None:
-    """Tell that there is no daemon."""
+    """Print that the daemon is not running. rosz has none."""
     print_lines(["The daemon is not running"])
 
 
@@ -164,8 +164,8 @@ stop_daemon = daemon_status
 
 
 def start_daemon(_: Namespace) -> None:
-    """Tell that no daemon is needed."""
-    print_error("there is no daemon to start: commands ask the nodes themselves")
+    """Print that rosz needs no daemon."""
+    print_error("rosz has no daemon: its commands query the nodes directly")
 
 
 def multicast(_: Namespace) -> None:

@@ -37,7 +37,7 @@ _PARTS = {
 -s --use-sim-time | ignored: nodes know it by themselves""",
     "strategy": """
 $direct
---no-daemon | ignored: there is no daemon""",
+--no-daemon | ignored: rosz has no daemon""",
     "type": "-t --show-types | print the types as well",
     "content": """
 --csv | print values with commas between them

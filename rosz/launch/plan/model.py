@@ -280,7 +280,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         nodes = {node.full_name: node for node in reversed(self.processes)}
         if name in nodes:
             return nodes[name]
-        listing = f"; the nodes are {', '.join(sorted(nodes))}" if nodes else "; there are no nodes"
+        listing = (
+            f"; the nodes are {', '.join(sorted(nodes))}" if nodes else "; the launch has no nodes"
+        )
         raise NotFoundError(f"no node '{name}' in this launch{near_miss(name, nodes) or listing}")
 
     @property

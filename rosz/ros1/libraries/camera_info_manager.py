@@ -102,7 +102,7 @@ class CameraInfoManager:
         return bool(self.getCameraInfo().k[0] != 0.0)
 
     def loadCameraInfo(self) -> None:  # noqa: N802
-        """Load the calibration; an empty one if there is no file.
+        """Load the calibration from its file. Without a file the calibration is empty.
 
         Raises:
             CameraInfoMissingError: The package of the URL does not exist.
@@ -201,7 +201,7 @@ def resolveURL(url: str, cname: str) -> str:  # noqa: N802
 
 
 def loadCalibrationFile(filename: str, cname: str) -> Any:  # noqa: N802
-    """Return the calibration in a file; an empty one if there is no file, or nothing in it.
+    """Return the calibration in a file. It is empty if the file is missing or empty.
 
     Args:
         filename: Path of the file.

@@ -347,7 +347,7 @@ class MenuHandler:
             callback: Function that is called when it is chosen.
 
         Returns:
-            Its handle; None if there is no such parent.
+            The handle of the entry, or None if the parent does not exist.
         """
         handle = self.doInsert(title, command_type, command, callback)
         if parent is None:
@@ -360,26 +360,26 @@ class MenuHandler:
         return handle
 
     def setVisible(self, handle: int, visible: bool) -> bool:
-        """Set whether clients show an entry; return whether there is one of that handle."""
+        """Set whether clients show an entry. Return whether the entry exists."""
         if handle not in self.entry_contexts_:
             return False
         self.entry_contexts_[handle].visible = visible
         return True
 
     def setCheckState(self, handle: int, check_state: int) -> bool:
-        """Set the check box of an entry; return whether there is one of that handle."""
+        """Set the check box of an entry. Return whether the entry exists."""
         if handle not in self.entry_contexts_:
             return False
         self.entry_contexts_[handle].check_state = check_state
         return True
 
     def getCheckState(self, handle: int) -> int | None:
-        """Return the state of the check box; None if there is no entry of that handle."""
+        """Return the state of the check box, or None if the entry does not exist."""
         context = self.entry_contexts_.get(handle)
         return context.check_state if context is not None else None
 
     def getTitle(self, handle: int) -> str | None:
-        """Return the text of an entry; None if there is no entry of that handle."""
+        """Return the text of an entry, or None if the entry does not exist."""
         context = self.entry_contexts_.get(handle)
         return context.title if context is not None else None
 

@@ -403,7 +403,7 @@ def test_a_plan_finds_its_parts() -> None:
     assert machine.address == "h"
     with pytest.raises(NotFoundError, match="no node '/m' in this launch; the nodes are /n"):
         found.node("/m")
-    with pytest.raises(NotFoundError, match="there are no nodes"):
+    with pytest.raises(NotFoundError, match="the launch has no nodes"):
         Plan().node("/m")
     with pytest.raises(NotFoundError, match="no machine 'x'"):
         found.machine("x")

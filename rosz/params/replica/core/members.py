@@ -36,7 +36,7 @@ class _Absence(msgspec.Struct, frozen=True):
 
 
 class Movement(NamedTuple):
-    """How the visible replicas changed.
+    """A change of the set of visible replicas.
 
     Attributes:
         came: Those that appeared, and the sessions under which they were absent; empty if not.

@@ -214,7 +214,11 @@ def check_running() -> None:
 
 
 def deadline_of(timeout: float | DurationValue | None) -> float:
-    """Return the ``time.monotonic()`` at which a wait ends; raise a UsageError if it is no time."""
+    """Return the ``time.monotonic()`` at which a wait with a timeout ends.
+
+    Raises:
+        UsageError: The timeout is not a number.
+    """
     if timeout is None:
         return time.monotonic() + NO_LIMIT
     seconds = timeout.to_sec() if isinstance(timeout, DurationValue) else timeout

@@ -194,8 +194,8 @@ class BufferInterface:
     ) -> TransformStamped:
         """Return the transform from the source frame to the target frame.
 
-        Frames, time and errors are those of `BufferCore.lookup_transform_core`. The timeout is the
-        longest time to wait for the transform; without one there is no wait.
+        Frames, time and errors are those of `BufferCore.lookup_transform_core`. The timeout
+        limits the wait for the transform; without a timeout the method does not wait.
         """
         raise NotImplementedException
 
