@@ -17,7 +17,7 @@ from rosz.errors import ParamError, RoszError, WaitTimeout
 if TYPE_CHECKING:
     from rosz.node import Node
 
-_SERVICE_SECONDS = 20.0
+_SERVICE_SECONDS = 5.0
 _TYPES: tuple[tuple[str, str, str], ...] = (
     ("not set", "Parameter not set.", ""),
     ("boolean", "Boolean value is:", "bool_value"),
