@@ -20,7 +20,8 @@ from rosz.errors import BagError, UsageError
 SIZE = 768 << 20
 MOST = 600 << 20
 _USE = """
-import resource, sys
+import re, sys
+from pathlib import Path
 from rosz.cli.main import run
 from rosz.ros1.tools import rosbag
 
@@ -32,7 +33,8 @@ try:
         print(len(list(opened.read_messages(raw=True))), "messages")
 except rosbag.ROSBagException as error:
     print(error)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10)
+# Not ru_maxrss, which begins with the memory of the process that started this one.
+print(int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1]) << 10)
 """
 
 

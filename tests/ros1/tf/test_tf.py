@@ -17,6 +17,7 @@ ROBOT = """
     static.sendTransform(fixed)
     broadcaster = tf.TransformBroadcaster()
     turn = tf.transformations.quaternion_from_euler(0, 0, 1.5707963267948966)
+    print("begins")
     while not rospy.is_shutdown():
         broadcaster.sendTransform((1, 2, 0), turn, rospy.Time.now(), "base", "map")
         rospy.sleep(0.02)
@@ -24,7 +25,7 @@ ROBOT = """
 
 
 def test_tf_and_tf2(network: Network) -> None:
-    network.program(ROBOT)
+    network.program(ROBOT).wait_for("begins")
     viewer = network.program(
         """
         import rosz.ros1
