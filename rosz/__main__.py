@@ -7,10 +7,9 @@ import _signal as signal  # type: ignore[import-not-found]  # it has no stubs
 def main() -> None:
     """Run the command line of this process, and exit with its exit code.
 
-    Until a command sets a handler, Ctrl-C ends the process at once, as it ends a program in C: an
-    exception raised by an import would print a traceback, or get lost in a callback. This is also
-    true for a command that a script starts in the background, where the shell makes programs
-    ignore Ctrl-C; ROS 1's commands end there too.
+    Until a command sets a handler, Ctrl-C ends the process at once: `KeyboardInterrupt` during an
+    import would print a traceback, or get lost in a callback. Ctrl-C also ends a command that a
+    script runs in the background, although the shell makes it ignore Ctrl-C; ROS 1's do so too.
     """
     if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, signal.SIG_IGN):
         signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -97,7 +97,7 @@ __all__ = (
 )
 
 _SHOWN = 200
-"""Characters of a name that an error shows."""
+"""Characters of a name that an error shows, and of each end of a line."""
 
 
 def near_miss(word: str, known: Iterable[str]) -> str:
@@ -139,6 +139,11 @@ class InvalidName(RoszError, ValueError):
         super().__init__(f"'{shown}' is not a valid name: {reason}")
 
 
+def _without_middle(line: str) -> str:
+    """Return a line that does not repeat a value of many characters, such as one of a file."""
+    return line if len(line) <= 3 * _SHOWN else f"{line[:_SHOWN]}…{line[-_SHOWN:]}"
+
+
 class SourceError(RoszError):
     """An error in a text that a person wrote.
 
@@ -150,11 +155,11 @@ class SourceError(RoszError):
     """
 
     def __init__(self, reason: str, path: str = "<string>", line: int = 0, column: int = 0) -> None:
-        self.reason = reason
+        self.reason: str = "\n".join(map(_without_middle, reason.split("\n")))
         self.path = path
         self.line = line
         self.column = column
-        super().__init__(f"{self.place}: {reason}")
+        super().__init__(f"{self.place}: {self.reason}")
 
     @property
     def place(self) -> str:

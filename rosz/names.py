@@ -31,6 +31,7 @@ __all__ = (
     "is_valid",
     "join",
     "namespace",
+    "printable",
     "resolve",
     "ros1_type",
     "short_type",
@@ -47,6 +48,7 @@ _VALID = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*", re.ASCII)
 _BASE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)  # ROS 2 hides names that begin with "_"
 _PART = re.compile(r"[A-Za-z0-9_/]", re.ASCII)
 _LOGS = ("/rosout", "/rosout_agg")
+_CONTROLS = {code: f"\\u{code:04x}" for code in (*range(9), *range(11, 32), *range(127, 160))}
 
 
 def is_valid(name: str) -> bool:
@@ -54,6 +56,11 @@ def is_valid(name: str) -> bool:
     return not name or (
         len(name) <= LONGEST_NAME and _VALID.fullmatch(name) is not None and "//" not in name
     )
+
+
+def printable(text: str) -> str:
+    """Return a text with its control characters, except tabs and line feeds, escaped as in JSON."""
+    return text.translate(_CONTROLS)
 
 
 def check_length(name: str, limit: int = LONGEST_NAME) -> str:

@@ -28,7 +28,7 @@ COMMANDS = {
     "catkin": _NOTHING_TO_BUILD,
     "catkin_init_workspace": "a workspace is any folder with 'src' in it; nothing needs building",
     "catkin_make_isolated": _NOTHING_TO_BUILD,
-    "colcon": _NOTHING_TO_BUILD,
+    "colcon": "'pip install rosz[colcon]' brings it; programs in Python run without a build",
     "gazebo": _GAZEBO,
     "gzclient": _GAZEBO,
     "gzserver": _GAZEBO,

@@ -68,8 +68,9 @@ def run_task(task: Callable[[], object]) -> None:
 def lend_thread(task: Callable[[], object]) -> bool:
     """Call a function on a thread that nobody uses; any thread, and any signal handler, may do so.
 
-    There are as many such threads as there are tasks at the same time. They are daemons. A task
-    belongs to the program of its caller; see `rosz.program.current`.
+    Tasks that end soon share a few such threads; each task that blocks has one of its own. They are
+    daemons. A task belongs to the program of its caller;
+    see `rosz.program.current`.
 
     Args:
         task: The function; an exception that it raises is logged.
@@ -78,21 +79,39 @@ def lend_thread(task: Callable[[], object]) -> bool:
         Whether it will be called: false if no thread is free, and none can be started since the
         process ends or has too many.
     """
-    work = current(), task
-    try:
-        _free_threads.pop().put(work)
-    except IndexError:
-        name = "rosz-lent"
-        with within(None), suppress(RuntimeError):
-            return start_thread(threading.Thread(target=_lend, args=work, name=name, daemon=True))
+    if not (_free_threads or _add_lent_thread()):
         return False
+    _tasks.put((current(), task))
+    if not _free_threads:  # the thread that was free has taken another task
+        _add_lent_thread()
     return True
 
 
-def _lend(program: Program | None, task: Callable[[], object]) -> None:
-    """Call a task, and then those that come within the time for which a thread is kept."""
-    free, tasks = _free_threads, SimpleQueue[_Task]()
+def _add_lent_thread() -> bool:
+    thread = threading.Thread(target=_lend, name="rosz-lent", daemon=True)
+    _free_threads.append(True)
+    with within(None), suppress(RuntimeError):
+        if start_thread(thread):
+            return True
+    _free_threads.pop()
+    return False
+
+
+def _lend() -> None:
+    """Call tasks, until none has come within the time for which a thread is kept."""
+    free, tasks = _free_threads, _tasks
     while True:
+        try:
+            program, task = tasks.get(timeout=_LENT_SECONDS)
+            free.pop()
+        except Empty:
+            free.pop()
+            try:
+                program, task = tasks.get_nowait()  # it counted on this thread
+            except Empty:
+                return
+        if not (free or tasks.empty()):
+            _add_lent_thread()
         try:
             with within(program):
                 task()
@@ -100,22 +119,79 @@ def _lend(program: Program | None, task: Callable[[], object]) -> None:
             if not ENDING.is_set():
                 _log.exception("a task on a thread that was lent failed")
         del program, task
-        free.append(tasks)
-        try:
-            program, task = tasks.get(timeout=_LENT_SECONDS)
-        except Empty:
-            try:
-                free.remove(tasks)
-            except ValueError:  # it was lent at this moment
-                program, task = tasks.get()
-            else:
-                return
+        free.append(True)
 
 
-_Task = tuple[Program | None, Callable[[], object]]
-_free_threads: deque[SimpleQueue[_Task]] = deque()
-"""Where the threads that nobody uses take their next tasks from."""
-os.register_at_fork(after_in_child=_free_threads.clear)
+_tasks: SimpleQueue[tuple[Program | None, Callable[[], object]]] = SimpleQueue()
+_free_threads: deque[bool] = deque()
+"""One item for each thread that waits for a task, or is about to."""
+
+
+def _forget_lent_threads() -> None:
+    global _tasks  # noqa: PLW0603  # a thread of the parent may hold the lock of the old one
+    _tasks = SimpleQueue()
+    _free_threads.clear()
+
+
+os.register_at_fork(after_in_child=_forget_lent_threads)
+
+
+class Serial:
+    """Work that lent threads do, one thread at a time, when there is some.
+
+    Args:
+        work: Function that does all that there is to do. It is called again if there is more.
+        keeps_thread: Whether the same thread does it while there is something to do every few
+            seconds, as each connection of ROS 1 has its thread: a callback may use what is bound to
+            one, such as objects of sqlite3.
+    """
+
+    def __init__(self, work: Callable[[], object], *, keeps_thread: bool = False) -> None:
+        self._work = work
+        self._seconds = _LENT_SECONDS if keeps_thread else 0.0
+        self._program = current()
+        self._more = False
+        self._calls: SimpleQueue[None] = SimpleQueue()
+        self._working = threading.Lock()
+
+    def wake(self) -> None:
+        """Start the work on another thread, if it is not running; neither blocks nor raises.
+
+        If no thread can be lent, the work waits for the next call that gets one.
+        """
+        if self._more:
+            return
+        self._more = True
+        if not self._working.acquire(blocking=False):
+            self._calls.put(None)
+        elif not lend_thread(self._run):
+            self._more = False
+            self._working.release()
+
+    def _run(self) -> None:
+        more = True
+        with within(self._program):
+            while more:
+                try:
+                    self._work_until_idle()
+                finally:
+                    self._working.release()
+                # A call may have come between the end of the wait and the release.
+                more = self._more and self._working.acquire(blocking=False)
+
+    def _work_until_idle(self) -> None:
+        with suppress(Empty):
+            while True:
+                self._more = False
+                self._work()
+                self._calls.get(timeout=self._seconds)
+
+
+def handle_all(receive: Callable[[], T | None], handle: Callable[[T], object]) -> None:
+    """Handle items until ``receive`` returns ``None``."""
+    while (item := receive()) is not None:
+        handle(item)
+        del item
 
 
 class _Delayed:

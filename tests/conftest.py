@@ -20,8 +20,9 @@ from hypothesis import HealthCheck, settings
 from network import TIMEOUT, Network
 
 from rosz.actions import ActionClient
+from rosz.graph import Graph
 from rosz.message import Ros2Default
-from rosz.node import Client, Publisher, Subscription
+from rosz.node import Client, Context, Publisher, Subscription
 
 # Tests give the same result on a busy machine. ROSZ_EXAMPLES=20000 takes a night.
 settings.register_profile(
@@ -106,6 +107,12 @@ def patient_waits(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatc
             monkeypatch.setattr(wait, "__defaults__", (TIMEOUT,))
         monkeypatch.setattr(Publisher.wait_for_subscribers, "__defaults__", (1, TIMEOUT))
         monkeypatch.setattr("rosz.node.client._GRACE", TIMEOUT)  # of a call for its server
+        # After these, a session counts as linked to all, and what is known as complete.
+        monkeypatch.setattr(Context, "MESH_TIMEOUT", TIMEOUT)
+        monkeypatch.setattr("rosz.params.replica.replica._MESH_TIMEOUT", TIMEOUT)
+        monkeypatch.setattr(Graph.refresh, "__defaults__", (TIMEOUT,))
+        for module in ("graph", "interests"):
+            monkeypatch.setattr(f"rosz.graph.{module}.COMPLETE_BY", TIMEOUT)
 
 
 @pytest.fixture

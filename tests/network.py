@@ -320,6 +320,10 @@ class Network:
         """Start Python with a command line."""
         return self._keep(Program([sys.executable, *argv], self.variables(**variables)))
 
+    def execute(self, *command: str, **variables: str) -> Program:
+        """Start a program of any kind."""
+        return self._keep(Program(command, self.variables(**variables)))
+
     def thread(self, function: Callable[[], object]) -> threading.Thread:
         """Run a function on a thread that the test waits for in the end."""
         thread = threading.Thread(target=function, daemon=True)

@@ -37,7 +37,9 @@ def test_each_command_has_a_program() -> None:
         package = "rqt_gui" if file.name == "rqt" else file.name
         words = f'run {package} {package} "$@"' if file.name in windows else file.name
         line = f'exec "${{ROSZ_PYTHON:-python3}}" -P -m rosz {words}'
-        assert file.read_text() == f"#!/bin/sh\n{line}\n"
+        start, *installed, end = file.read_text().splitlines()
+        assert (start, end) == ("#!/bin/sh", line)
+        assert not installed or file.name == "colcon"
         assert file.stat().st_mode & 0o111 == 0o111
 
 
@@ -51,9 +53,9 @@ def test_what_it_says_is_one_line_of_commands_that_are_there(name: str) -> None:
 
 
 def test_a_command_in_the_shell(network: Network) -> None:
-    done = evaluate(network, "rosdep install x; colcon build; wstool update")
+    done = evaluate(network, "rosdep install x; rosmake all; wstool update")
     lines = done.stderr.splitlines()
-    names = "rosdep", "colcon", "wstool"
+    names = "rosdep", "rosmake", "wstool"
     assert lines == [f"ERROR: rosz has no '{name}': {instead_of(name)}" for name in names]
     assert (done.returncode, done.stdout) == (2, "")
 

@@ -230,6 +230,7 @@ def test_a_thread_is_lent_again_after_a_task_that_fails(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(worker, "_free_threads", deque())
+    monkeypatch.setattr(worker, "_tasks", SimpleQueue())
     used: SimpleQueue[int] = SimpleQueue()
 
     def task() -> None:
@@ -238,15 +239,17 @@ def test_a_thread_is_lent_again_after_a_task_that_fails(
 
     with caplog.at_level(logging.ERROR):
         assert lend_thread(task)
+        first = used.get(timeout=TIMEOUT)
         eventually(lambda: bool(worker._free_threads), "the end of the task")
         assert lend_thread(task)
-    assert used.get(timeout=TIMEOUT) == used.get(timeout=TIMEOUT)
+    assert used.get(timeout=TIMEOUT) == first
     assert "no such thing" in caplog.text
 
 
 def test_a_thread_that_nobody_uses_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "_LENT_SECONDS", 0.0)
     monkeypatch.setattr(worker, "_free_threads", deque())
+    monkeypatch.setattr(worker, "_tasks", SimpleQueue())
     used: SimpleQueue[threading.Thread] = SimpleQueue()
     for _ in range(200):  # some while a thread is about to end
         assert lend_thread(lambda: used.put(threading.current_thread()))

@@ -4,8 +4,6 @@ A server is a bridge or the page. Its policy is made of its settings, and of the
 machine (`rosz.security`). The package may import what a node may.
 """
 
-from __future__ import annotations
-
 from rosz.access.connecting import (
     PasswordGuesses,
     is_loopback,

@@ -43,18 +43,4 @@ if TYPE_CHECKING:
         ServerGoal,
     )
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "actionlib_client": "ActionlibClient ActionlibClientGoal",
-            "actionlib_server": "ActionlibServer ActionlibServerGoal",
-            "comm_state": "CommState",
-            "gateway": "ServiceGateway TopicGateway",
-            "listing": "ActionEntry action_type describe_action find_action list_actions"
-            " view_of_action wait_for_action",
-            "simple_server": "SimpleActionServer",
-            "types": "ActionTypes",
-            "rosz.node.actions": "FINAL RESULT SEND STATUS TERMINAL ActionClient ActionlibState"
-            " ActionServer ClientGoal GoalState ServerGoal",
-        },
-    )
+    __getattr__ = exports_of(__name__)

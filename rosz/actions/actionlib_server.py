@@ -196,18 +196,11 @@ class ActionlibServer:
                 for topic, kind in kinds.items()
             }
             self._others = [
-                node.subscription(
-                    f"{self.name}/cancel",
-                    GoalID,
-                    self._receive_cancel,
-                    queue_size=self.queue_size,
-                ),
-                node.subscription(
-                    f"{self.name}/goal",
-                    types.action_goal,
-                    self._receive_goal,
-                    queue_size=self.queue_size,
-                ),
+                node.subscription(f"{self.name}/{topic}", kind, receive, queue_size=self.queue_size)
+                for topic, kind, receive in (
+                    ("cancel", GoalID, self._receive_cancel),
+                    ("goal", types.action_goal, self._receive_goal),
+                )
             ]
             if self.status_frequency > 0:
                 period = 1 / self.status_frequency

@@ -1,4 +1,4 @@
-"""Actions of actionlib in ROS 2's protocol: goals for its servers, and goals of its clients."""
+"""Translation between actionlib's protocol for actions and that of ROS 2, in both directions."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class ActionlibToRos2:
         )
 
     def send(self, goal: FollowedGoal, message: Any) -> None:
-        """Send a goal, which is updated; raise EncodeError if a value does not fit its field."""
+        """Send a goal, and update it from then on; raise EncodeError if a value does not fit."""
         native = _translate(message, self._action.Goal)
         native.to_cdr()
         self._ids[goal] = uuid.uuid4()
@@ -109,7 +109,8 @@ class ActionlibToRos2:
 
         They are those accepted until the time of the ID, or all if it is empty.
         """
-        own = next((goal for goal in list(self._ids) if goal.id.id == goal_id.id), None)
+        goals = (reference() for reference in self._ids.keyrefs())  # others may send meanwhile
+        own = next((goal for goal in goals if goal and goal.id.id == goal_id.id), None)
         if own is not None:
             self.cancel(own)
         elif not goal_id.id:
@@ -211,7 +212,7 @@ class Ros2ToActionlib(GoalServer):
         return self._remote or str(goal.id) in self._mirrored or goal.done
 
     def start(self, goal: ServerGoal) -> None:
-        """Hand a goal to a server in another node; another one has begun with it."""
+        """Leave a goal to the server in another node that has begun with it."""
         if self._remote:
             self._hand_over(goal)
 
@@ -222,7 +223,7 @@ class Ros2ToActionlib(GoalServer):
         self._receive_goal(types.action_goal(Header(stamp=stamp), GoalID(stamp, name), request))
 
     def choose_cancelled(self, goals: list[ServerGoal], all_until: int | None) -> list[ServerGoal]:
-        """Let the server know that a client wants goals to end, also those of actionlib's."""
+        """Tell the server to cancel goals, also those of clients that speak actionlib."""
         if all_until is not None:
             self._receive_cancel(GoalID(stamp=Time.from_nsec(all_until)))
         for goal in goals:

@@ -44,19 +44,7 @@ if TYPE_CHECKING:
     )
     from rosz.bags.summary import Summary, format_summary, format_yaml, summarize
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "bag": "Attachment BagReader BagWriter Channel Chunk Compression DamageReport Entry"
-            " Payload",
-            "formats.mcap_reader": "McapReader",
-            "formats.mcap_writer": "McapWriter",
-            "formats.rosbag2_reader": "STORAGES Storage",
-            "messages": "Bag BagMessage BagOutput class_of decoder_of",
-            "opening": "FORMATS create_file create_writer find_format form_of open open_reader",
-            "summary": "Summary format_summary format_yaml summarize",
-        },
-    )
+    __getattr__ = exports_of(__name__)
 
 __all__ = (
     "FORMATS",

@@ -6,10 +6,13 @@ with its header of four bytes, or ROS 1's layout, as the encoding of the channel
 
 from __future__ import annotations
 
+import math
 import os
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
+from heapq import heappop, heappush
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal, NoReturn, Protocol, Self, TypeAlias, TypeVar
@@ -92,6 +95,16 @@ class Channel(msgspec.Struct, frozen=True):
         return any(qos.latched for qos in self.qos)
 
 
+def count_by_channel(
+    counts: Mapping[int, int], channels: Mapping[int, Channel]
+) -> Counter[Channel]:
+    """Return the number of messages of each channel, from that of each number in a file."""
+    totals: Counter[Channel] = Counter()
+    for number, channel in channels.items():
+        totals[channel] += counts.get(number, 0)
+    return totals
+
+
 class Entry(msgspec.Struct, frozen=True, gc=False):
     """One recorded message, encoded.
 
@@ -151,21 +164,22 @@ def in_order(
 ) -> Iterator[list[R]]:
     """Yield the rows of spans in order, in runs; those of spans that overlap are merged.
 
-    A span comes with its earliest and its latest stamp; a row begins with its stamp.
+    A span comes with its earliest and its latest stamp; a row begins with its stamp and its place.
     """
+    sign = -1 if reverse else 1
     ordered = sorted(spans, key=lambda span: -span[1] if reverse else span[0])
-    waiting: list[R] = []
+    waiting: list[tuple[int, int, R]] = []  # heap; sorting all again took quadratic time
     for (_, _, span), following in zip_longest(ordered, ordered[1:]):
-        waiting += rows_of(span)
-        waiting.sort()
-        if reverse:
-            cut = bisect_left(waiting, (following[1] + 1,)) if following else 0
-            yield waiting[cut:][::-1]
-            del waiting[cut:]
-        else:
-            cut = bisect_left(waiting, (following[0],)) if following else len(waiting)
-            yield waiting[:cut]
-            del waiting[:cut]
+        limit = (-following[1] if reverse else following[0]) if following else math.inf
+        run = sorted(rows_of(span), reverse=reverse)
+        cut = bisect_left(run, limit, key=lambda row: sign * row[0])
+        for row in run[cut:]:
+            heappush(waiting, (sign * row[0], sign * row[1], row))
+        del run[cut:]
+        while waiting and waiting[0][0] < limit:
+            run.append(heappop(waiting)[2])
+        run.sort(reverse=reverse)
+        yield run
 
 
 DamageReport: TypeAlias = Callable[[BagError], object]

@@ -6,14 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from rosz.bags.bag import (
-    Attachment,
-    BagReader,
-    BagWriter,
-    Channel,
-    Entry,
-    Payload,
-)
+from rosz.bags.bag import Attachment, BagReader, BagWriter, Channel, Entry, Payload
 from rosz.bags.formats.channel_text import event_definition
 from rosz.errors import DefinitionError, TypeNotFound
 from rosz.lifecycle import Closing

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import re
 import time
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
@@ -14,6 +17,7 @@ from rosz.bags.formats.ros1_reader import Ros1Reader
 from rosz.names import short_type
 
 _NS = 1_000_000_000
+_PLAIN = re.compile(r"[/\w]([-\w/. +@=~]*[-\w/.+@=~])?")
 _BINARY = 1024.0
 _DECIMAL = 1000.0
 _SIZES = ("KB", "MB", "GB", "TB", "PB", "EB", "ZB", "YB")
@@ -89,14 +93,12 @@ def summarize(path: str, reader: BagReader, *, frequencies: bool = False) -> Sum
     per_second = find_frequencies(reader) if frequencies else {}
     types: dict[str, str] = {}
     counts: Counter[str] = Counter()
-    connections: Counter[str] = Counter()
+    connections = Counter(channel.topic for channel in reader.channels)
     names: dict[str, str] = {}
     for channel in dict.fromkeys(reader.channels):
         types.setdefault(short_type(channel.type), channel.md5)
         names.setdefault(channel.topic, short_type(channel.type))
         counts[channel.topic] += reader.count(channel)
-    for channel in reader.channels:
-        connections[channel.topic] += 1
     start, end = _seconds(reader.start), _seconds(reader.end)
     return Summary(
         path=path,
@@ -140,12 +142,9 @@ def _compressions(reader: BagReader) -> list[CompressionSummary]:
 def find_frequencies(reader: BagReader) -> dict[str, float]:
     """Return how often messages of each topic came, by the median of the times between them."""
     stamps: defaultdict[str, list[float]] = defaultdict(list)
-    if isinstance(reader, Ros1Reader):
-        for channel in reader.channels:
-            stamps[channel.topic] += map(_seconds, reader.stamps(channel))
-    else:
-        for entry in reader.messages():
-            stamps[entry.channel.topic].append(_seconds(entry.stamp))
+    entries = ((entry.channel, entry.stamp) for entry in reader.messages())
+    for channel, stamp in reader.stamps() if isinstance(reader, Ros1Reader) else entries:
+        stamps[channel.topic].append(_seconds(stamp))
     frequencies = {}
     for topic, times in stamps.items():
         times.sort()
@@ -196,18 +195,14 @@ def _date(seconds: float) -> str:
 
 
 def _size(size: float) -> str:
-    for unit in _SIZES:
-        size /= _BINARY
-        if size < _BINARY:
-            return f"{size:.1f} {unit}"
-    return "-"
+    return _scaled(size / _BINARY, _BINARY, _SIZES)
 
 
-def _frequency(value: float) -> str:
-    for unit in _FREQUENCIES:
-        if value < _DECIMAL:
+def _scaled(value: float, step: float, units: Sequence[str]) -> str:
+    for unit in units:
+        if value < step:
             return f"{value:.1f} {unit}"
-        value /= _DECIMAL
+        value /= step
     return "-"
 
 
@@ -224,22 +219,15 @@ def _compression_rows(summary: Summary) -> list[tuple[str, str]]:
     rows = [("compression", ", ".join(texts) or "none")]
     if all(compression.name == "none" for compression in summary.compressions):
         return rows
-    before, after = _sizes(summary)
-    width = max(len(_size(before)), len(_size(after)))
-    if summary.duration <= 0:
-        return [
-            *rows,
-            ("uncompressed", f"{_size(before):>{width}}"),
-            ("compressed", f"{_size(after):>{width}}"),
-        ]
-    rates = [f"{_size(each / summary.duration)}" for each in (before, after)]
-    wide = max(map(len, rates))
-    share = f"({100 * after / max(before, 1):.2f}%)"
-    return [
-        *rows,
-        ("uncompressed", f"{_size(before):>{width}} @ {rates[0]:>{wide}}/s"),
-        ("compressed", f"{_size(after):>{width}} @ {rates[1]:>{wide}}/s {share}"),
-    ]
+    before, after = sizes = _sizes(summary)
+    width = max(len(_size(size)) for size in sizes)
+    texts = [f"{_size(size):>{width}}" for size in sizes]
+    if summary.duration > 0:
+        rates = [_size(size / summary.duration) for size in sizes]
+        wide = max(map(len, rates))
+        texts = [f"{text} @ {rate:>{wide}}/s" for text, rate in zip(texts, rates, strict=True)]
+        texts[1] += f" ({100 * after / max(before, 1):.2f}%)"
+    return [*rows, *zip(("uncompressed", "compressed"), texts, strict=True)]
 
 
 def _sizes(summary: Summary) -> tuple[int, int]:
@@ -260,7 +248,9 @@ def _topic_rows(summary: Summary) -> list[tuple[str, str]]:
     digits = max(len(str(topic.messages)) for topic in topics)
     type_width = max(map(len, summary.types))
     shown = {
-        topic.topic: _frequency(topic.frequency) for topic in topics if topic.frequency is not None
+        topic.topic: _scaled(topic.frequency, _DECIMAL, _FREQUENCIES)
+        for topic in topics
+        if topic.frequency is not None
     }
     wide = max(map(len, shown.values()), default=0)
     rows = []
@@ -279,7 +269,7 @@ def _topic_rows(summary: Summary) -> list[tuple[str, str]]:
 
 def format_yaml(summary: Summary) -> str:
     """Return the text of ``rosbag info --yaml``."""
-    lines = [f"path: {summary.path}", f"version: {summary.version}"]
+    lines = [f"path: {_scalar(summary.path)}", f"version: {summary.version}"]
     if not summary.messages:
         return "\n".join([*lines, f"size: {summary.size}", "indexed: False", ""])
     lines += [
@@ -296,12 +286,12 @@ def format_yaml(summary: Summary) -> str:
         lines += [f"uncompressed: {before}", f"compressed: {after}"]
     lines.append("types:")
     for name, md5 in summary.types.items():
-        lines += [f"    - type: {name}", f"      md5: {md5}"]
+        lines += [f"    - type: {_scalar(name)}", f"      md5: {md5}"]
     lines.append("topics:")
     for topic in summary.topics:
         lines += [
-            f"    - topic: {topic.topic}",
-            f"      type: {topic.type}",
+            f"    - topic: {_scalar(topic.topic)}",
+            f"      type: {_scalar(topic.type)}",
             f"      messages: {topic.messages}",
         ]
         if topic.connections > 1:
@@ -309,3 +299,13 @@ def format_yaml(summary: Summary) -> str:
         if topic.frequency is not None:
             lines.append(f"      frequency: {topic.frequency:.4f}")
     return "\n".join([*lines, ""])
+
+
+def _scalar(text: str) -> str:
+    """Return a name as YAML: as it is if it can only mean that, else in quotes."""
+    if _PLAIN.fullmatch(text):
+        return text
+    import yaml  # slow to load, and rarely needed
+
+    quoted: str = yaml.dump(text, default_style='"', width=math.inf)
+    return quoted.rstrip("\n")

@@ -113,6 +113,8 @@ def candidates(line: Line) -> list[str]:
         return HELPERS[first](line) if len(rest) < _HELPER_WORDS.get(first, 2) else []
     if rest == ["help"]:
         return [*pages(), *COMMANDS]
+    if rest[:2] in (["ros2", "run"], ["ros2", "launch"]) and not word.startswith("-"):
+        rest = rest[1:]  # packages and programs, as for rosz
     if rest[:1] == ["ros2"]:
         from rosz.cli.ros2 import words_after
 

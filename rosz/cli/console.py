@@ -7,17 +7,22 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
+from rosz.names import printable
+
+if TYPE_CHECKING:
+    from rosz.node import Context, MessageInfo
 
 _LOOK_PERIOD = 0.2
 """Seconds between two looks for signals."""
 _SAME_REQUEST_SECONDS = 1.0
-_COLORS = {"error": "31", "warning": "33"}
+_COLORS = {"debug": "32", "warn": "33", "warning": "33", "error": "31", "fatal": "31"}
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Print lines to standard output, and flush it."""
-    sys.stdout.write("".join(f"{line}\n" for line in lines))
+    """Print lines to standard output, and flush it; control characters are escaped."""
+    sys.stdout.write(printable("".join(f"{line}\n" for line in lines)))
     sys.stdout.flush()
 
 
@@ -25,7 +30,7 @@ def print_json(value: Any) -> None:
     """Print a value as indented JSON."""
     import msgspec
 
-    sys.stdout.write(msgspec.json.format(msgspec.json.encode(value, enc_hook=str)).decode() + "\n")
+    print_lines([msgspec.json.format(msgspec.json.encode(value, enc_hook=str)).decode()])
 
 
 def print_json_line(value: Any) -> None:
@@ -44,8 +49,8 @@ def print_result(lines: Iterable[str], value: Any, *, as_json: bool) -> None:
 
 
 def print_error(text: str) -> None:
-    """Print a line to standard error."""
-    sys.stderr.write(f"{text}\n")
+    """Print a line to standard error; control characters are escaped."""
+    sys.stderr.write(printable(f"{text}\n"))
     sys.stderr.flush()
 
 
@@ -60,13 +65,69 @@ def count(number: int, word: str) -> str:
 
 
 def paint(text: str, level: str) -> str:
-    """Return a text in the color of ``error`` or ``warning``."""
-    return f"\033[{_COLORS[level]}m{text}\033[0m"
+    """Return a text in the color of a level, such as ``error``, if it has one."""
+    return f"\033[{_COLORS[level]}m{text}\033[0m" if level in _COLORS else text
 
 
 def takes_escapes(stream: TextIO) -> bool:
     """Return whether a stream is a terminal with colors and a cursor that can be moved."""
     return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+class MessagePrinter:
+    """Prints messages on the thread of a subscription, while the main thread waits for the end.
+
+    Args:
+        to_text: Function that returns the text of a message; None for one that is left out.
+        count: Number of texts after which it ends; no limit when not given.
+    """
+
+    def __init__(
+        self, to_text: Callable[[Any, MessageInfo], str | None], count: int | None = None
+    ) -> None:
+        import threading
+
+        self._to_text = to_text
+        self._left = count or -1  # which is never 0 after a message
+        self._ended = threading.Event()
+        self._error: Exception | None = None
+
+    def receive(self, message: Any, info: MessageInfo) -> None:
+        """Print a message."""
+        if self._ended.is_set():
+            return
+        try:
+            text = self._to_text(message, info)
+            if text is None:
+                return
+            sys.stdout.write(text)
+            sys.stdout.flush()
+        except Exception as error:  # noqa: BLE001  # raised in the main thread
+            self._error = error
+            self._ended.set()
+            return
+        self._left -= 1
+        if not self._left:
+            self._ended.set()
+
+    def wait(self, context: Context, *, timeout: float | None = None, topic: str = "") -> None:
+        """Wait for the last message, or for some seconds; then print no more.
+
+        Raises:
+            ClosedError: The context is shut down.
+            Exception: A message could not be printed.
+        """
+        from rosz.errors import ClosedError
+
+        withdraw = context.on_shutdown(lambda _: self._ended.set())
+        self._ended.wait(timeout)
+        self._ended.set()
+        withdraw()
+        if self._error is not None:
+            raise self._error
+        if context.is_shutdown:
+            reason = context.reason or "shut down"
+            raise ClosedError(f"no more of '{topic}': {reason}" if topic else reason)
 
 
 def write_file(file: str, content: bytes) -> None:

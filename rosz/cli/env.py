@@ -21,7 +21,14 @@ from rosz.cli.console import print_json, print_result, warn
 from rosz.cli.declare import App, Argument, Option
 from rosz.errors import UsageError, near_miss
 
-SHELLS = ("bash", "zsh", "fish")
+_CODE = {
+    "bash": ("posix.sh", "complete.bash"),
+    "zsh": ("posix.sh", "complete.zsh"),
+    "fish": ("rosz.fish",),
+}
+"""The files with the code of each shell; values replace words such as ``@python@``."""
+
+SHELLS = (*_CODE,)
 
 ALIASES = {
     **{name: name for name in OLD_NAMES},
@@ -33,64 +40,6 @@ ALIASES = {
 """Commands of ROS, with the commands of rosz that replace them."""
 
 _HELPERS = ("roscd", "rosed", "rosls", "rospack")
-
-_POSIX = """\
-export ROSZ_PYTHON={python}
-case ":$PATH:" in *:{folder}:*) ;; *) export PATH={folder}:"$PATH":{absent} ;; esac
-case ":${{PYTHONPATH-}}:" in
-  *:{modules}:*) ;;
-  *) export PYTHONPATH="${{PYTHONPATH:+$PYTHONPATH:}}"{modules} ;;
-esac
-unalias roscd 2>/dev/null
-roscd() {{
-  local package="${{1%%/*}}" folder
-  folder="$("$ROSZ_PYTHON" -P -m rosz pkg find "$package")" && cd "$folder${{1#"$package"}}"
-}}
-"""
-
-_BASH = """\
-if [[ $- = *i* ]]; then
-_rosz_complete() {{
-  local line="${{COMP_LINE:0:COMP_POINT}}"
-  mapfile -t COMPREPLY < <("$ROSZ_PYTHON" -P -m rosz complete bash "$line" 2>/dev/null)
-  [[ ${{#COMPREPLY[@]}} = 1 && $COMPREPLY = *[/=] ]] && compopt -o nospace
-  return 0
-}}
-complete -F _rosz_complete {names}
-fi
-"""
-
-_ZSH = """\
-if [[ -o interactive ]]; then
-(( $+functions[compdef] )) || {{ autoload -Uz compinit && compinit -u -D; }}
-_rosz_complete() {{
-  local line="${{(j: :)words[1,CURRENT-1]}} $PREFIX"
-  local -a found ended
-  found=(${{(f)"$("$ROSZ_PYTHON" -P -m rosz complete zsh "$line" 2>/dev/null)"}})
-  ended=(${{found:#*[/=]}})
-  found=(${{(M)found:#*[/=]}})
-  (( $#ended )) && compadd -Q -a ended
-  (( $#found )) && compadd -Q -S '' -a found
-}}
-compdef _rosz_complete {names}
-fi
-"""
-
-_FISH = """\
-set -gx ROSZ_PYTHON {python}
-contains {folder} $PATH; or set -gx PATH {folder} $PATH {absent}
-contains {modules} $PYTHONPATH; or set -gx --path PYTHONPATH $PYTHONPATH {modules}
-function roscd
-    set -l parts (string split -m 1 / "$argv[1]")
-    set -l folder ($ROSZ_PYTHON -P -m rosz pkg find "$parts[1]"); and cd "$folder/$parts[2]"
-end
-function __rosz_complete
-    $ROSZ_PYTHON -P -m rosz complete fish (commandline -cp | string collect) 2>/dev/null
-end
-for command in {names}
-    complete -c $command -f -a "(__rosz_complete)"
-end
-"""
 
 app = App()
 
@@ -162,12 +111,14 @@ def _setting(name: str, value: object) -> str:
 
 def _script(shell: str, home: str, python: str) -> str:
     """Return the code for a shell to evaluate, from the folder of the package and Python."""
-    text = {"bash": _POSIX + _BASH, "zsh": _POSIX + _ZSH, "fish": _FISH}[shell]
-    names = " ".join(("rosz", *ALIASES, *_HELPERS))
-    return text.format(
-        folder=shlex.quote(f"{home}/cli/bin"),
-        absent=shlex.quote(f"{home}/cli/absent"),
-        modules=shlex.quote(f"{home}/ros1/shell"),
-        python=shlex.quote(python),
-        names=names,
-    )
+    values = {
+        "folder": shlex.quote(f"{home}/cli/bin"),
+        "absent": shlex.quote(f"{home}/cli/absent"),
+        "modules": shlex.quote(f"{home}/ros1/shell"),
+        "python": shlex.quote(python),
+        "names": " ".join(("rosz", *ALIASES, *_HELPERS)),
+    }
+    text = "".join(Path(home, "cli", "shell", file).read_text("utf-8") for file in _CODE[shell])
+    for name, value in values.items():
+        text = text.replace(f"@{name}@", value)
+    return text

@@ -26,13 +26,7 @@ from rosz.packages import PackageIndex, manifest_of
 
 if TYPE_CHECKING:
     from rosz.launch.plan import LaunchText, Plan
-    from rosz.launch.run import (
-        LaunchStatus,
-        NodeStatus,
-        Options,
-        StatusClient,
-        Workplace,
-    )
+    from rosz.launch.run import LaunchStatus, NodeStatus, Options, StatusClient, Workplace
     from rosz.node import Context
 
 app = App()

@@ -10,15 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from rosz.cli import suggest
 from rosz.cli.call import Call
-from rosz.cli.console import (
-    print_json_line,
-    print_lines,
-    print_result,
-    takes_escapes,
-    warn,
-)
+from rosz.cli.console import paint, print_json_line, print_result, takes_escapes, warn
 from rosz.cli.declare import App, Argument, Option, at_least
 from rosz.errors import DecodeError, UsageError
+from rosz.names import printable
 
 if TYPE_CHECKING:
     from rosz.introspect import LogFilter
@@ -107,7 +102,7 @@ def _follow(
     from rosz.msgs.rcl_interfaces.msg import Log
 
     color = takes_escapes(sys.stdout) and not os.environ.get("NO_COLOR")
-    left = count
+    left = count or -1  # which is never 0 after a line
     with call.lasting_node(_TOOL) as node:
         queue: SimpleQueue[Sample | None] = SimpleQueue()
         subscribe_samples(node, _ROSOUT, Log._type_name, Log._type_hash, queue.put)
@@ -123,8 +118,9 @@ def _follow(
             if as_json:
                 print_json_line(line)
             else:
-                print_lines([format_line(line, color=color, verbose=verbose)])
-            if left is not None:
-                left -= 1
-                if left <= 0:
-                    return
+                text = printable(format_line(line, verbose=verbose))
+                sys.stdout.write(f"{paint(text, line.level.lower() if color else '')}\n")
+                sys.stdout.flush()
+            left -= 1
+            if not left:
+                return

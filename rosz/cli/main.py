@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
 from rosz.cli.commands import COMMANDS, OLD_NAMES, format_rows, load
+from rosz.cli.console import print_error
 from rosz.errors import RoszError, UsageError, near_miss
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ def _version() -> str:
 
 
 def _fail(what: object, code: int) -> int:
-    sys.stderr.write(f"ERROR: {what}\n")
+    print_error(f"ERROR: {what}")
     return code
 
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator
+import threading
+import time
+from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Self
 
 from rosz import names
 from rosz.cli import suggest
 from rosz.cli.call import Call
 from rosz.cli.console import (
+    count,
     print_error,
     print_json,
     print_json_line,
     print_lines,
     print_result,
+    takes_escapes,
     until_stopped,
     warn,
     write_file,
@@ -27,11 +31,14 @@ from rosz.cli.declare import App, Argument, Json, Option, at_least, values_last
 from rosz.errors import NotFoundError, ParamNotFound, RoszError, UsageError, YamlError
 
 if TYPE_CHECKING:
+    from rosz.introspect import ParameterTree
     from rosz.params import Change, Difference, Value
-    from rosz.params.replica import Changed, Outcome, ParamClient
+    from rosz.params import Path as ParamPath
+    from rosz.params.replica import Changed, Outcome
 
 _TOOL = "rosparam"
 _STDIN = "<stdin>"
+_PROGRESS_EVERY = 1.0
 
 # Most values are written alike in YAML and in Python, and importing a YAML parser takes longer than
 # getting or setting a value.
@@ -66,10 +73,10 @@ def list_command(
 ) -> None:
     """List parameters."""
     with _client(call) as client:
-        names = _gone_names(call, client, namespace) if gone else client.names()
-        space = "/" if namespace is None else _resolve(call, namespace).rstrip("/") + "/"
+        space = _space(call, namespace)
+        names = sorted(_gone(call, client, space).values()) if gone else client.names()
         inside = [name for name in names if name.startswith(space)]
-    print_result(["\n".join(inside)], inside, as_json=json)
+    print_result(["\n".join(inside)] if inside or not gone else [], inside, as_json=json)
 
 
 @app.command("get")
@@ -156,12 +163,14 @@ def delete_command(
 
 
 def _delete_gone(
-    call: Call, client: ParamClient, namespace: str | None, *, yes: bool, verbose: bool
+    call: Call, client: ParameterTree, namespace: str | None, *, yes: bool, verbose: bool
 ) -> int:
     """Delete the parameters of nodes that are gone, once the user has agreed."""
-    from rosz.params import DELETED, split
+    from rosz.params import DELETED, lookup, split
 
-    names = _gone_names(call, client, namespace)
+    space = _space(call, namespace)
+    gone = _gone(call, client, space)
+    names = sorted(gone.values())
     if call.incomplete:
         raise UsageError(
             "not all machines are reached, so nodes there may be alive; nothing is deleted"
@@ -182,25 +191,46 @@ def _delete_gone(
         if sys.stdin.readline().strip().lower() not in {"y", "yes"}:
             print_error("nothing is deleted")
             return 1
-    _warn_slow(client, client.write([(split(name), DELETED) for name in names]))
+    top = split(space)
+    left = _covering(lookup(client.store.get("/"), top), top, gone)
+    _warn_slow(client, client.store.write([(path, DELETED) for path in left]))
     _log(verbose, (f"deleted parameter [{name}]" for name in names))
     return 0
 
 
-def _gone_names(call: Call, client: ParamClient, namespace: str | None) -> list[str]:
-    """Return the parameters below names of nodes of which none is alive.
+def _space(call: Call, namespace: str | None) -> str:
+    """Return the resolved name of a namespace, by default the root, with a slash at its end."""
+    return "/" if namespace is None else _resolve(call, namespace).rstrip("/") + "/"
 
-    A parameter in the root belongs to no node.
+
+def _gone(call: Call, client: ParameterTree, space: str) -> dict[ParamPath, str]:
+    """Return the paths below names of nodes of which none is alive, with their names.
+
+    A parameter in the root belongs to no node. A namespace without parameters, which ROS 1 leaves
+    when the last one is deleted, has a name that ends with a slash.
     """
-    space = "/" if namespace is None else _resolve(call, namespace).rstrip("/") + "/"
+    from rosz.params import ends, joined
+
     alive = {f"{token.node_name}/" for token in call.survey().view.tokens}
-    return [
-        name
-        for name in client.names()
-        if name.startswith(space)
+    return {
+        path: name
+        for path, value in ends(client.store.get("/"))
+        if path
+        and (name := joined(path) + "/" * (value == {})).startswith(space)
         and name.count("/") > 1
         and not any(name.startswith(node) for node in alive)
-    ]
+    }
+
+
+def _covering(value: Value, path: ParamPath, paths: Container[ParamPath]) -> Iterator[ParamPath]:
+    """Yield the topmost paths that hold nothing but given ones, so that no namespace stays."""
+    from rosz.params import ends
+
+    if path and all(below in paths for below, _ in ends(value, path)):
+        yield path
+    elif type(value) is dict:
+        for key, item in value.items():
+            yield from _covering(item, (*path, key), paths)
 
 
 @app.command("dump")
@@ -248,7 +278,7 @@ def load_command(
 
     source = _STDIN if file == "-" else file
     text = _read_stdin() if file == "-" else _decode(_read_bytes(file, NotFoundError), file)
-    with _client(call) as client:
+    with _Progress(f"reading {source}") as progress, _client(call) as client:
         _log(verbose, [f"reading parameters from {'stdin' if file == '-' else f'[{file}]'}"])
         own = _resolve(call, namespace)
         documents = load_documents(text, own, source)
@@ -256,15 +286,58 @@ def load_command(
         _log(verbose, (f"reading parameters into namespace [{space}]" for space in spaces))
         set_by = [list(spread(space, value)) for space, value in documents]
         changes = condense(change for each in set_by for change in each)
-        if dry_run:
-            differences = preview(client.get("/"), changes)
-            print_result(map(_change_line, differences), differences, as_json=json)
-            if not json:
-                print_error(f"{len(differences)} parameters would change; nothing is written")
-            return
-        _warn_slow(client, client.write(changes))
+        differences = preview(client.get("/"), changes) if dry_run else []
+        loading = f"loading {count(len(changes), 'parameter')}"
+        progress.text = loading
+
+        def on_progress(holders: int, waiting: list[str]) -> None:
+            others = f", waiting for {', '.join(waiting)}" if waiting else ""
+            progress.text = f"{loading}, known to {count(holders, 'replica')}{others}"
+
+        outcome = None if dry_run else client.write(changes, on_progress)
+    if outcome is None:
+        print_result(map(_change_line, differences), differences, as_json=json)
+        if not json:
+            print_error(f"{len(differences)} parameters would change; nothing is written")
+        return
+    _warn_slow(client, outcome)
     for (_, value), each in zip(documents, set_by, strict=True):
         _log(verbose, _format_leaves(value, each))
+
+
+class _Progress:
+    """A line on a terminal that tells what a command does, if that takes longer than a second.
+
+    Args:
+        text: What it does.
+
+    Attributes:
+        text: What it does now.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._show, daemon=True)
+
+    def __enter__(self) -> Self:
+        if takes_escapes(sys.stderr):
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _show(self) -> None:
+        began = time.monotonic()
+        while not self._ended.wait(_PROGRESS_EVERY):
+            passed = time.monotonic() - began
+            sys.stderr.write(f"\r\033[K{self.text} ({passed:.0f} s)")
+            sys.stderr.flush()
+        sys.stderr.write("\r\033[K")
+        sys.stderr.flush()
 
 
 @app.command("search")
@@ -277,7 +350,7 @@ def search_command(
 ) -> int:
     """Print the full name of a parameter, searched in a namespace and then in those above it."""
     with _client(call) as client:
-        full = client.search(name, _resolve(call, namespace))
+        full = client.store.search(name, _resolve(call, namespace))
     print_result([] if full is None else [full], full, as_json=json)
     if full is None:
         print_error(f"ERROR: Cannot find parameter [{name}] in an upwards search")
@@ -314,13 +387,13 @@ def watch_command(
 
 
 @contextmanager
-def _client(call: Call, word: str = "Parameter") -> Iterator[ParamClient]:
+def _client(call: Call, word: str = "Parameter") -> Iterator[ParameterTree]:
     """Open a client; say in rosparam's words that a parameter is not set."""
-    from rosz.params.replica import ParamClient
+    from rosz.introspect import ParameterTree
 
     try:
         with call.session() as session:
-            yield ParamClient(session, call.domain)
+            yield ParameterTree(session, call.domain, warn)
     except ParamNotFound as error:
         hint = str(error).partition(" is not set")[2]
         raise NotFoundError(f"{word} [{error.name}] is not set{hint}") from error
@@ -415,11 +488,11 @@ def _format_leaves(value: Value, changes: Iterable[Change]) -> Iterator[str]:
         yield from (f"/{'/'.join(path)}={item}" for path, item in changes)
 
 
-def _warn_slow(client: ParamClient, outcome: Outcome) -> None:
+def _warn_slow(client: ParameterTree, outcome: Outcome) -> None:
     """Name the processes that have not applied a write, or do not answer at all."""
     if outcome.slow:
         warn(f"written, but not yet known to {', '.join(outcome.slow)}, which did not answer")
-    for label in client.silent:
+    for label in client.store.silent:
         warn(f"{label} does not answer")
 
 

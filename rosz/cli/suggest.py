@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from threading import Thread
 
     from rosz.environment import Environment
+    from rosz.graph import View
     from rosz.introspect import Survey
     from rosz.packages import PackageIndex
     from rosz.session import Session
@@ -109,9 +110,12 @@ class Line:
         return _SHARE * self.environment.completion
 
     @cached_property
-    def survey(self) -> Survey | None:
-        """The nodes and topics of the domain; ``None`` when nobody answers."""
-        return self.take_survey()
+    def view(self) -> View:
+        """The nodes and topics of the domain; none when nobody answers."""
+        from rosz.graph import View
+
+        survey = self.take_survey()
+        return View(()) if survey is None else survey.view
 
     def take_survey(self, *, processes: bool = False) -> Survey | None:
         """Return the survey, with the processes of the nodes if wanted."""
@@ -126,11 +130,6 @@ class Line:
                 timeout=self._left * _SHARE if processes else self._left * 2 * _SHARE,
             )
         )
-
-    @cached_property
-    def topics(self) -> dict[str, list[str]]:
-        """The topics with their types."""
-        return {} if self.survey is None else self.survey.view.topics()
 
     @property
     def types(self) -> TypeStore:
@@ -153,13 +152,13 @@ Source = Callable[[Line], list[str]]
 
 def topics(line: Line) -> list[str]:
     """Return the topics, and the fields of the topic that is being typed."""
-    return [*line.topics, *(_fields(line) if "/" in line.word[1:] else ())]
+    return [*line.view.topics(), *(_fields(line) if "/" in line.word[1:] else ())]
 
 
 def _fields(line: Line) -> list[str]:
     from rosz.message import slots
 
-    for topic, types in line.topics.items():
+    for topic, types in line.view.topics().items():
         if line.word.startswith(f"{topic}/"):
             *path, _ = line.word.removeprefix(f"{topic}/").split("/")
             head = "/".join((topic, *path))
@@ -174,12 +173,13 @@ def _fields(line: Line) -> list[str]:
 
 def topic_types(line: Line) -> list[str]:
     """Return the types of all topics."""
-    return _ros1_types(line.topics.values())
+    return _ros1_types(line.view.topics().values())
 
 
 def topic_type(line: Line) -> list[str]:
     """Return the types of the topic before; all message types if it does not exist."""
-    return _ros1_types([line.topics.get(line.before[0], [])]) or line.types.names("msg")
+    types = line.view.topics().get(line.before[0], [])
+    return _ros1_types([types]) or line.types.names("msg")
 
 
 def pub_values(line: Line) -> list[str]:
@@ -191,21 +191,21 @@ def pub_values(line: Line) -> list[str]:
 
 def services(line: Line) -> list[str]:
     """Return the services."""
-    return [] if line.survey is None else list(line.survey.view.services())
+    return list(line.view.services())
 
 
 def service_types(line: Line) -> list[str]:
     """Return the types of all services."""
-    return [] if line.survey is None else _ros1_types(line.survey.view.services().values())
+    return _ros1_types(line.view.services().values())
 
 
 def request_values(line: Line) -> list[str]:
     """Return a request of the service before, with all defaults, as one word of YAML."""
     from rosz.wire import Kind
 
-    if len(line.before) != 1 or line.survey is None:
+    if len(line.before) != 1:
         return []
-    servers = line.survey.view.entities(Kind.SERVICE, name=line.before[0])
+    servers = line.view.entities(Kind.SERVICE, name=line.before[0])
     return [_as_yaml(line.types.service(servers[0].type_name).Request)] if servers else []
 
 
@@ -213,22 +213,21 @@ def actions(line: Line) -> list[str]:
     """Return the actions."""
     from rosz.actions import list_actions
 
-    survey = line.survey
-    return [] if survey is None else [entry.name for entry in list_actions(survey.view)]
+    return [entry.name for entry in list_actions(line.view)]
 
 
 def goal_values(line: Line) -> list[str]:
     """Return a goal of the action before, with all defaults, as one word of YAML."""
     from rosz.actions import find_action
 
-    if len(line.before) != 1 or line.survey is None:
+    if len(line.before) != 1:
         return []
-    return [_as_yaml(line.types.action(find_action(line.survey.view, line.before[0])).Goal)]
+    return [_as_yaml(line.types.action(find_action(line.view, line.before[0])).Goal)]
 
 
 def nodes(line: Line) -> list[str]:
     """Return the nodes."""
-    return [] if line.survey is None else sorted(set(line.survey.view.nodes()))
+    return sorted(set(line.view.nodes()))
 
 
 def machines(line: Line) -> list[str]:

@@ -21,6 +21,7 @@ from rosz.cli.console import (
 )
 from rosz.cli.declare import App, Argument, Json, Option, at_least, seconds
 from rosz.errors import NotFoundError, near_miss
+from rosz.names import printable
 
 if TYPE_CHECKING:
     from rosz.doctor import Examination, Finding
@@ -66,11 +67,11 @@ def _show(findings: Iterable[Finding], examination: Examination) -> list[Finding
     shown: list[Finding] = []
     for finding in findings:
         shown.append(finding)
-        title = f"{finding.level.upper()} {finding.name}"
-        if colored:
-            title = paint(title, finding.level)
+        title = paint(f"{finding.level.upper()} {finding.name}", finding.level if colored else "")
         evidence = "".join(f"  - {line}\n" for line in listed(finding.evidence))
-        print_lines([f"{title}: {finding.text}\n{evidence}  what to do: {finding.remedy}\n"])
+        text = printable(f"{finding.text}\n{evidence}  what to do: {finding.remedy}\n")
+        sys.stdout.write(f"{title}: {text}\n")
+        sys.stdout.flush()
     errors = sum(finding.level == "error" for finding in shown)
     counts = f"{count(errors, 'error')}, {count(len(shown) - errors, 'warning')}"
     verdict = counts if shown else "all is well"

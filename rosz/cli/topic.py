@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -14,6 +13,7 @@ import msgspec
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import (
+    MessagePrinter,
     print_json,
     print_json_line,
     print_lines,
@@ -22,7 +22,7 @@ from rosz.cli.console import (
     warn,
 )
 from rosz.cli.declare import Argument, Json, Option, at_least, per_second
-from rosz.errors import ClosedError, EncodeError, NotFoundError, UsageError
+from rosz.errors import EncodeError, NotFoundError, UsageError
 
 if TYPE_CHECKING:
     from rosz.introspect import EchoOptions, Filter, Target, Topic
@@ -209,11 +209,21 @@ def echo_command(call: Call, topic: _TopicOrField, flags: EchoFlags) -> None:
         target, token = _wait_for(node, topic)
         cls = None if flags.raw else find_class(node, token)
         to_text = _raw_text(options) if cls is None else _text(node, target, cls, options)
-        printer = _Printer(to_text, 1 if flags.once else flags.count)
+
+        def show(message: Any, info: MessageInfo) -> str | None:
+            if info.lost:
+                warn(f"{info.lost} messages are missing here")
+            try:
+                return to_text(message)
+            except LookupError as error:
+                warn(f"a message is left out: {error}")
+                return None
+
+        printer = MessagePrinter(show, 1 if flags.once else flags.count)
         node.subscription(
             target.topic, cls, printer.receive, queue_size=_DEPTH, raw=flags.raw, with_info=True
         )
-        printer.wait(node.context, target.topic)
+        printer.wait(node.context, topic=target.topic)
 
 
 def _wait_for(node: Node, name: str) -> tuple[Target, Token]:
@@ -240,48 +250,6 @@ def _raw_text(options: EchoOptions) -> Callable[[Any], str]:
     return lambda payload: f"{dump_bytes(payload)}\n---\n"
 
 
-class _Printer:
-    """Prints messages on the subscription's thread; the main thread waits for the end."""
-
-    def __init__(self, to_text: Callable[[Any], str | None], count: int | None) -> None:
-        self._to_text = to_text
-        self._left = count
-        self._ended = threading.Event()
-        self._error: Exception | None = None
-
-    def receive(self, message: Any, info: MessageInfo) -> None:
-        if self._ended.is_set():
-            return
-        try:
-            if info.lost:
-                warn(f"{info.lost} messages are missing here")
-            text = self._to_text(message)
-            if text is None:
-                return
-            sys.stdout.write(text)
-            sys.stdout.flush()
-        except LookupError as error:
-            warn(f"a message is left out: {error}")
-            return
-        except Exception as error:  # noqa: BLE001  # raised in the main thread
-            self._error = error
-            self._ended.set()
-            return
-        if self._left is not None:
-            self._left -= 1
-            if not self._left:
-                self._ended.set()
-
-    def wait(self, context: Context, topic: str) -> None:
-        withdraw = context.on_shutdown(lambda _: self._ended.set())
-        self._ended.wait()
-        withdraw()
-        if self._error is not None:
-            raise self._error
-        if context.is_shutdown:
-            raise ClosedError(f"no more of '{topic}': {context.reason or 'shut down'}")
-
-
 @app.command("hz")
 def hz_command(
     call: Call,
@@ -298,7 +266,7 @@ def hz_command(
     accepted = Filter(condition) if condition else None
     size = _window(window)
     with call.lasting_node(_TOOL) as node:
-        clock = time.monotonic_ns if wall_time else node.context.clock.steady
+        clock = time.monotonic_ns if wall_time else node.clock.steady
         meters: dict[str, RateMeter] = {}
         for name in topics:
             target, token = _wait_for(node, name)
@@ -456,13 +424,11 @@ def pub_command(
     with until_stopped() as ready, call.context(lasting=not options.once) as context:
         cls = context.types.message(type_name)
         ready()
-        if options.file or arguments or not cls.__slots__:
-            _publish(context, topic, cls, options, arguments, documents)
-        elif sys.stdin.isatty():
-            raise UsageError(f"no values are given; they are: {list_arguments(cls)}")
-        else:
+        if not options.file and not arguments and cls.__slots__:
+            if sys.stdin.isatty():
+                raise UsageError(f"no values are given; they are: {list_arguments(cls)}")
             documents = read_stream(sys.stdin.buffer, warn)
-            _publish(context, topic, cls, options, arguments, documents)
+        _publish(context, topic, cls, options, arguments, documents)
 
 
 def _publish(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 
 from rosz.diagram.labels import place_labels
 from rosz.diagram.layers import BoxPlace, PictureLayout, lay_out
@@ -16,27 +17,15 @@ _RATE_LETTERS = 7
 """Room for a rate that gets longer while the picture stays."""
 _NARROWEST_GAP, _WIDEST_GAP = 72.0, 260.0
 _GROUP_MARGIN = 8.0
-_STYLE = """
-text { font: 12px system-ui, sans-serif; fill: var(--graph-text, #1c2433); text-anchor: middle }
-.node rect { fill: var(--graph-node, #e3ecff); stroke: var(--graph-node-line, #2456c8) }
-.topic rect { fill: var(--graph-topic, #f4f1e8); stroke: var(--graph-topic-line, #a08a4a) }
-.group { fill: none; stroke: var(--graph-line, #8f9bb0); stroke-dasharray: 4 3 }
-.arrow path { fill: none; stroke: var(--graph-line, #8f9bb0); stroke-width: 1.4 }
-.group-name { text-anchor: start }
-.arrow text, .group-name { font-size: 11px; fill: var(--graph-soft, #5b6577) }
-.arrow text { paint-order: stroke; stroke: var(--graph-back, #ffffff); stroke-width: 4px;
-  stroke-linejoin: round }
-.arrow .crowded { display: none }
-.arrow:hover path { stroke: var(--graph-node-line, #2456c8); stroke-width: 2.5 }
-.arrow:hover .crowded { display: inline; fill: var(--graph-text, #1c2433) }
-.tip { fill: var(--graph-line, #8f9bb0) }
-.node, .topic { cursor: pointer }
-.chosen rect { stroke-width: 3 }
-"""
+_STYLE = Path(__file__).with_name("style.css").read_text("utf-8")
 
 
 def label_of(arrow: Arrow, rates: Mapping[str, str]) -> str:
-    """Return the label of an arrow: its topics if it joins nodes, and their rates."""
+    """Return the label of an arrow.
+
+    Between nodes: the topics with their rates, or the number of topics if these are more than two.
+    From a node to a topic: the rate alone. From a topic to a node: none.
+    """
     measured = [topic for topic in arrow.topics if topic in rates]
     if arrow.start.startswith("topic:"):
         return ""
@@ -71,7 +60,7 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
     """
     labels = labels_of(picture, rates or {})
     plain = [label_of(arrow, {}) for arrow in picture.arrows]
-    # In steps, so that a rate that changes rarely changes the layout.
+    # Rounded up, so that a new rate seldom moves the boxes.
     wide = -(-max(map(len, labels), default=0) // _LABEL_STEP) * _LABEL_STEP
     longest = max(wide, max(map(len, plain), default=0) + _LABEL_STEP * bool(rates))
     gap = min(_WIDEST_GAP, max(_NARROWEST_GAP, longest * _LETTER + 24))
@@ -81,7 +70,7 @@ def write_svg(picture: Picture, rates: Mapping[str, str] | None = None, chosen: 
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="nodes and topics"'
         f' viewBox="0 0 {layout.width:.0f} {layout.height:.0f}" width="{layout.width:.0f}"'
-        f' height="{layout.height:.0f}"><style>{_STYLE}</style><defs><marker id="tip"'
+        f' height="{layout.height:.0f}"><style>\n{_STYLE}</style><defs><marker id="tip"'
         ' viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
         '<path class="tip" d="M0 0L8 4L0 8z"/></marker></defs>',
         *_groups(layout),
@@ -121,29 +110,29 @@ def _arrow(arrow: Arrow, path: Sequence[tuple[float, float]], text: str) -> str:
 
 
 def _text(number: int, label: str, place: tuple[float, float, bool]) -> str:
-    """Return the label of an arrow, which is hidden until one points at it if it has no room."""
+    """Return the label of an arrow; without room it is only shown while the pointer is there."""
     x, y, has_room = place
     kind = "" if has_room else ' class="crowded"'
     return f'<text data-arrow="{number}"{kind} x="{x:.0f}" y="{y - 3:.0f}">{escape(label)}</text>'
 
 
 def _curve(path: Sequence[tuple[float, float]]) -> str:
-    """Return a path through points that is level at each, in whole pixels.
+    """Return an SVG path that is horizontal at each point, with whole coordinates.
 
-    Arrows of a large picture pass many layers: their paths are most of its text.
+    Most of the text of a large picture is such paths, so they are kept short.
     """
     x, y = map(round, path[0])
-    drawn, level = f"M{x} {y}", x
+    drawn, pen_x = f"M{x} {y}", x
     for right, down in path[1:]:
-        across, along = round(right) - x, round(down) - y
-        if along:
-            if level != x:
+        dx, dy = round(right) - x, round(down) - y
+        if dy:
+            if pen_x != x:
                 drawn += f"H{x}"
-            drawn += f"c{across / 2:g} 0 {across / 2:g} {along} {across} {along}"
-        x, y = x + across, y + along
-        if along:
-            level = x
-    return drawn if level == x else f"{drawn}H{x}"
+            drawn += f"c{dx / 2:g} 0 {dx / 2:g} {dy} {dx} {dy}"
+        x, y = x + dx, y + dy
+        if dy:
+            pen_x = x
+    return drawn if pen_x == x else f"{drawn}H{x}"
 
 
 def _groups(layout: PictureLayout) -> list[str]:

@@ -1,7 +1,7 @@
 """The layout of a picture in layers, from left to right, with few crossings; pure.
 
 As Sugiyama, Tagawa and Toda lay out hierarchies (1981): arrows that would go round are turned, each
-box gets a layer behind those that send to it, arrows over several layers get a bend in each, each
+box gets a layer right of those that send to it, arrows over several layers get a bend in each, each
 layer is put into the order of the mean places of its neighbours, and boxes move towards these.
 """
 
@@ -52,24 +52,24 @@ class PictureLayout(msgspec.Struct, frozen=True):
 class _Layers:
     """The vertices of a picture, by number: its boxes, and then the bends of its arrows.
 
-    Numbers and lists, since an arrow over many layers has a bend in each, and a large picture
-    some ten thousand. ``before`` and ``after`` are the neighbours in the adjacent layers.
+    Vertices are integers, because a large picture has about ten thousand bends. ``before`` and
+    ``after`` are the neighbours of each in the adjacent layers.
     """
 
     def __init__(self, picture: Picture) -> None:
         self.boxes = picture.boxes
         self.widths = [max(_NARROWEST, len(box.name) * _LETTER + 24) for box in self.boxes]
         self.heights = [_HEIGHT[box.kind] for box in self.boxes]
-        self.layer: list[int] = []
+        self.layer_of: list[int] = []
         self.before: list[list[int]] = [[] for _ in self.boxes]
         self.after: list[list[int]] = [[] for _ in self.boxes]
 
     def add_bend(self, layer: int) -> int:
         """Add a bend in a layer, and return its number."""
-        self.layer.append(layer)
+        self.layer_of.append(layer)
         self.before.append([])
         self.after.append([])
-        return len(self.layer) - 1
+        return len(self.layer_of) - 1
 
     def join(self, vertex: int, other: int) -> None:
         """Make vertices of adjacent layers neighbours."""
@@ -96,17 +96,17 @@ def lay_out(picture: Picture, gap: float = 64.0) -> PictureLayout:
     keys = [box.key for box in picture.boxes]
     edges = [(arrow.start, arrow.end) for arrow in picture.arrows]
     forward = _acyclic(keys, edges)
-    layer_of = _layer(keys, [pair for pair in forward if pair[0] != pair[1]])
+    layers_by_key = _assign_layers(keys, [pair for pair in forward if pair[0] != pair[1]])
     graph = _Layers(picture)
-    graph.layer += [layer_of[key] for key in keys]
-    chains = _chain(graph, forward)
-    layers = _collect(graph, chains)
-    _order(graph, layers)
-    return _measure(picture, graph, chains, layers, _place(graph, layers), gap)
+    graph.layer_of += [layers_by_key[key] for key in keys]
+    chains = _make_chains(graph, forward)
+    layers = _vertices_by_layer(graph, chains)
+    _order_layers(graph, layers)
+    return _make_layout(picture, graph, chains, layers, _find_middles(graph, layers), gap)
 
 
 def _acyclic(keys: Sequence[str], edges: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return the edges, those turned that close a circle in a search from the sources."""
+    """Return the edges, with those reversed that close a cycle in a search from the sources."""
     after: dict[str, list[str]] = {key: [] for key in keys}
     indegree = dict.fromkeys(keys, 0)
     for start, end in edges:
@@ -134,8 +134,8 @@ def _acyclic(keys: Sequence[str], edges: Sequence[tuple[str, str]]) -> list[tupl
     return [(end, start) if (start, end) in back else (start, end) for start, end in edges]
 
 
-def _layer(keys: Sequence[str], edges: Iterable[tuple[str, str]]) -> dict[str, int]:
-    """Return the layer of each box: behind all before it, sources right before their first."""
+def _assign_layers(keys: Sequence[str], edges: Iterable[tuple[str, str]]) -> dict[str, int]:
+    """Return layers: boxes right of predecessors, sources just left of their first successor."""
     after: dict[str, list[str]] = {key: [] for key in keys}
     waiting = dict.fromkeys(keys, 0)
     for start, end in edges:
@@ -156,15 +156,15 @@ def _layer(keys: Sequence[str], edges: Iterable[tuple[str, str]]) -> dict[str, i
     return layer
 
 
-def _chain(graph: _Layers, edges: Sequence[tuple[str, str]]) -> list[list[int]]:
+def _make_chains(graph: _Layers, edges: Sequence[tuple[str, str]]) -> list[list[int]]:
     """Join the boxes of each edge, by a bend in each layer between them."""
     number = {box.key: number for number, box in enumerate(graph.boxes)}
     ends = [(number[start], number[end]) for start, end in edges]
-    spans = sum(abs(graph.layer[last] - graph.layer[first]) for first, last in ends)
+    spans = sum(abs(graph.layer_of[last] - graph.layer_of[first]) for first, last in ends)
     bends = spans <= _MOST_BENDS
     chains = []
     for first, last in ends:
-        between = range(graph.layer[first] + 1, graph.layer[last]) if bends else ()
+        between = range(graph.layer_of[first] + 1, graph.layer_of[last]) if bends else ()
         chain = [first, *map(graph.add_bend, between), last]
         if first != last:
             for vertex, other in itertools.pairwise(chain):
@@ -173,22 +173,22 @@ def _chain(graph: _Layers, edges: Sequence[tuple[str, str]]) -> list[list[int]]:
     return chains
 
 
-def _collect(graph: _Layers, chains: Iterable[list[int]]) -> list[list[int]]:
-    """Return the vertices of each layer, in groups, and beside each other by first sight."""
-    layers: list[list[int]] = [[] for _ in range(max(graph.layer, default=-1) + 1)]
+def _vertices_by_layer(graph: _Layers, chains: Iterable[list[int]]) -> list[list[int]]:
+    """Return the vertices of each layer: the boxes sorted by group, then the bends."""
+    layers: list[list[int]] = [[] for _ in range(max(graph.layer_of, default=-1) + 1)]
     for vertex in sorted(range(len(graph.boxes)), key=lambda vertex: graph.boxes[vertex].group):
-        layers[graph.layer[vertex]].append(vertex)
+        layers[graph.layer_of[vertex]].append(vertex)
     for chain in chains:
         for bend in chain[1:-1]:
-            layers[graph.layer[bend]].append(bend)
+            layers[graph.layer_of[bend]].append(bend)
     return layers
 
 
-def _order(graph: _Layers, layers: list[list[int]]) -> None:
-    """Order each layer by the mean order of its neighbours, there and back."""
-    order = [0] * len(graph.layer)
+def _order_layers(graph: _Layers, layers: list[list[int]]) -> None:
+    """Order each layer by the mean order of its neighbours, in sweeps to the right and back."""
+    order = [0] * len(graph.layer_of)
     for layer in layers:
-        _number(layer, order)
+        _note_order(layer, order)
     before = [near or [vertex] for vertex, near in enumerate(graph.before)]
     after = [near or [vertex] for vertex, near in enumerate(graph.after)]
     best, fewest = [list(layer) for layer in layers], _crossings(graph, layers, order)
@@ -199,14 +199,14 @@ def _order(graph: _Layers, layers: list[list[int]]) -> None:
         for layer in layers if forth else reversed(layers):
             wanted = _means(layer, before if forth else after, order)
             layer[:] = [layer[at] for at in sorted(range(len(layer)), key=wanted.__getitem__)]
-            _number(layer, order)
+            _note_order(layer, order)
         crossings = _crossings(graph, layers, order)
         if crossings < fewest:
             best, fewest = [list(layer) for layer in layers], crossings
     layers[:] = best
 
 
-def _number(layer: Iterable[int], order: list[int]) -> None:
+def _note_order(layer: Iterable[int], order: list[int]) -> None:
     for number, vertex in enumerate(layer):
         order[vertex] = number
 
@@ -248,9 +248,9 @@ def _inversions(values: Iterable[int]) -> int:
     return total
 
 
-def _place(graph: _Layers, layers: Sequence[list[int]]) -> list[float]:
+def _find_middles(graph: _Layers, layers: Sequence[list[int]]) -> list[float]:
     """Return the middles of vertices, moved towards their neighbours in the order of layers."""
-    middles = [0.0] * len(graph.layer)
+    middles = [0.0] * len(graph.layer_of)
     offsets = []
     for layer in layers:
         y = 0.0
@@ -303,7 +303,7 @@ def _spread(wanted: Sequence[float], offsets: Sequence[float]) -> Iterator[float
     return map(operator.add, starts, offsets)
 
 
-def _measure(
+def _make_layout(
     picture: Picture,
     graph: _Layers,
     chains: Sequence[list[int]],
@@ -311,7 +311,7 @@ def _measure(
     middles: Sequence[float],
     gap: float,
 ) -> PictureLayout:
-    """Return places and paths in numbers that begin at a margin."""
+    """Return the layout in pixels, with a margin on each side."""
     heights = [*map(graph.height, range(len(middles)))]
     top = min((y - height / 2 for y, height in zip(middles, heights, strict=True)), default=0.0)
     bottom = max((y + height / 2 for y, height in zip(middles, heights, strict=True)), default=0.0)
@@ -325,7 +325,7 @@ def _measure(
     shift = _MARGIN - top
     places: dict[str, BoxPlace] = {}
     for vertex, box in enumerate(graph.boxes):
-        at, width, height = graph.layer[vertex], graph.widths[vertex], graph.heights[vertex]
+        at, width, height = graph.layer_of[vertex], graph.widths[vertex], graph.heights[vertex]
         left = lefts[at] + (widths[at] - width) / 2
         places[box.key] = BoxPlace(box, left, middles[vertex] - height / 2 + shift, width, height)
     columns = [(left, left + width) for left, width in zip(lefts, widths, strict=True)]
@@ -333,9 +333,9 @@ def _measure(
     for chain, arrow in zip(chains, picture.arrows, strict=True):
         first, last = (places[graph.boxes[vertex].key] for vertex in (chain[0], chain[-1]))
         turned = first.box.key != arrow.start
-        # An arrow back is a little lower than one there, which may have the same ends.
+        # A turned arrow is a little lower than a forward one between the same boxes.
         lower = shift + _TURNED_SHIFT * turned
-        bends = [(*columns[graph.layer[vertex]], middles[vertex] + lower) for vertex in chain[1:-1]]
+        bends = [(*columns[graph.layer_of[bend]], middles[bend] + lower) for bend in chain[1:-1]]
         path = _path(first, last, bends, _TURNED_SHIFT * turned)
         paths.append(path[::-1] if turned else path)
     width = max(x - gap + _MARGIN, 2 * _MARGIN)
@@ -345,7 +345,7 @@ def _measure(
 def _path(
     first: BoxPlace, last: BoxPlace, bends: Iterable[tuple[float, float, float]], lower: float
 ) -> list[tuple[float, float]]:
-    """Return the points of an arrow, which is level in the layers that it passes.
+    """Return the points of an arrow, which is horizontal within the layers that it passes.
 
     A bend is the left and the right side of a layer, and the height at which the arrow passes.
     """

@@ -66,7 +66,7 @@ def examine(examination: Examination) -> Iterator[Finding]:
 
 def _examine_network(session: Session, examination: Examination) -> Iterator[Finding]:
     environment = examination.environment
-    survey = take_survey(session, environment.domain, processes=True)
+    survey = take_survey(session, environment.domain, processes=True, looks=3)
     examination.nodes = len(survey.view.nodes())
     yield from replies.check_waiting(session)
     yield from tokens.check_domains(session, survey)

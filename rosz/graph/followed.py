@@ -35,31 +35,31 @@ class Followed(Closing):
     def __init__(
         self, interests: Interests, keys: Iterable[tuple[str, str]], *, many: bool = False
     ) -> None:
-        self._all = interests
+        self._graph = interests
         self._interests: tuple[Interest, ...] = tuple(interests.acquire(keys, many=many))
-        self._known: tuple[int, View] | None = None
+        self._latest: tuple[int, View] | None = None
         self._closed = False
 
     @property
     def complete(self) -> bool:
-        """Whether all is known that existed when it began, or that takes too long."""
+        """Whether the tokens that existed at its start are known, or that takes too long."""
         return all(interest.settled for interest in self._interests)
 
     def share(self) -> None:
-        """Let those who follow single names from now on need no watch; this is never closed."""
-        self._all.draw_on(self._interests)
+        """Give these tokens to all that follow single names from now on; never close this then."""
+        self._graph.draw_on(self._interests)
 
     def view(self) -> View:
         """Return the tokens known at this moment; before `complete` some may be missing."""
-        latest = self._known  # replaced whole, so that reading it needs no lock
+        latest = self._latest  # replaced whole, so that reading it needs no lock
         if latest is not None and latest[0] == self._version():
             return latest[1]
-        with self._all.changed:
+        with self._graph.changed:
             version = self._version()
             view = View.of(
                 token for interest in self._interests for token in interest.tokens.values()
             )
-            self._known = version, view
+            self._latest = version, view
             return view
 
     def refresh(self, timeout: float) -> View:
@@ -72,30 +72,27 @@ class Followed(Closing):
             ClosedError: The session is closed.
             UsageError: The timeout is not a number.
         """
-        return self._all.query(
+        return self._graph.query(
             self._interests, [interest.key for interest in self._interests], timeout
         )
 
-    def listen(
-        self, listener: Callable[[Any, bool], None], *, history: bool = True
-    ) -> Callable[[], None]:
-        """Call a function for every change, in order, on the graph's thread.
+    def listen(self, listener: Callable[[Any, bool], None]) -> Callable[[], None]:
+        """Call a function for existing tokens, then for every change, on the graph's thread.
 
         Args:
-            listener: Function called with each token that appears or disappears; exceptions are
-                logged.
-            history: Whether to call it for existing tokens first.
+            listener: Function called with each token that appears or disappears, in order;
+                exceptions are logged.
 
         Returns:
             A function that unregisters the listener.
         """
         number = next(_numbers)
         for interest in self._interests:
-            self._all.register(interest, number, listener, history=history)
+            self._graph.register(interest, number, listener)
 
         def unregister() -> None:
             for interest in self._interests:
-                self._all.unregister(interest, number)
+                self._graph.unregister(interest, number)
 
         return unregister
 
@@ -121,7 +118,7 @@ class Followed(Closing):
         views: list[View] = []
 
         def is_met() -> bool:
-            # A part of the tokens could meet a condition that all of them do not.
+            # An incomplete view could meet a condition that the complete one does not meet.
             if not self.complete and time.monotonic() < deadline:
                 return False
             view = self.view()
@@ -130,17 +127,17 @@ class Followed(Closing):
             return bool(views)
 
         deadline = time.monotonic() + clamp_timeout(timeout)
-        if self._all.wait_until(is_met, deadline):
+        if self._graph.wait_until(is_met, deadline):
             return views[0]
-        if self._all.closing:
+        if self._graph.closing:
             raise ClosedError(f"the wait for {what} ended: shutting down")
         raise WaitTimeout(what, timeout, hint)
 
     def close(self) -> None:
-        """Follow it no longer; a second call has no effect."""
+        """Stop following the tokens; a second call has no effect."""
         closed, self._closed = self._closed, True
         if not closed:
-            self._all.release(self._interests)
+            self._graph.release(self._interests)
 
     def _version(self) -> int:
         return sum(interest.version for interest in self._interests)

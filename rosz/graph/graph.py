@@ -130,14 +130,14 @@ class Graph:
             return look(self.refresh())
         return look(self.view())
 
-    def listen(self, listener: GraphListener, *, history: bool = True) -> Callable[[], None]:
+    def listen(self, listener: GraphListener) -> Callable[[], None]:
         """Call a function for every change in the whole domain; see `Followed.listen`.
 
         Raises:
             ClosedError: The graph or its session is closed.
         """
         followed = self.follow(tokens_key(self.domain))
-        unregister = followed.listen(listener, history=history)
+        unregister = followed.listen(listener)
 
         def stop() -> None:
             unregister()

@@ -54,7 +54,7 @@ class Interest(msgspec.Struct, eq=False):
         began: Time when it was made, by the monotonic clock in seconds.
         complete: Whether it has the tokens that existed when it began.
         users: Number of those who follow it.
-        listeners: Functions called with each change, and whether they get earlier tokens.
+        listeners: Functions called with each change.
         watch: The watch of the session, once it is declared.
     """
 
@@ -66,7 +66,7 @@ class Interest(msgspec.Struct, eq=False):
     began: float = msgspec.field(default_factory=time.monotonic)
     complete: bool = False
     users: int = 0
-    listeners: dict[int, tuple[Callable[[Any, bool], None], bool]] = {}
+    listeners: dict[int, Callable[[Any, bool], None]] = {}
     watch: Closable | None = None
 
     @property
@@ -163,22 +163,17 @@ class Interests:
             return {key: token for interest in interests for key, token in interest.tokens.items()}
 
     def register(
-        self,
-        interest: Interest,
-        number: int,
-        listener: Callable[[Any, bool], None],
-        *,
-        history: bool,
+        self, interest: Interest, number: int, listener: Callable[[Any, bool], None]
     ) -> None:
         """Call a listener for each token of an interest, and for each change of it."""
 
         def begin(tokens: list[Any]) -> None:
-            interest.listeners[number] = listener, history
+            interest.listeners[number] = listener
             for token in tokens:
                 self._notify(interest, number, token, alive=True)
 
         def register() -> _Report:
-            return partial(begin, list(interest.tokens.values()) if history else [])
+            return partial(begin, list(interest.tokens.values()))
 
         self._events.put(register)
 
@@ -328,7 +323,7 @@ class Interests:
             interest.version += 1
             self._version += 1
             self.changed.notify_all()
-        report = partial(self._notify_all, interest, token, alive, alive and not interest.settled)
+        report = partial(self._notify_all, interest, token, alive)
         part = self._interests.get(_part_key(token)) if interest in self._whole else None
         if part is None or not part.is_part:
             return report
@@ -349,17 +344,14 @@ class Interests:
                 )
             return None
 
-    def _notify_all(
-        self, interest: Interest, token: Token | ProcessToken, alive: bool, existed: bool
-    ) -> None:
-        for number, (_, history) in list(interest.listeners.items()):
-            if history or not existed:
-                self._notify(interest, number, token, alive=alive)
+    def _notify_all(self, interest: Interest, token: Token | ProcessToken, alive: bool) -> None:
+        for number in list(interest.listeners):
+            self._notify(interest, number, token, alive=alive)
 
     def _notify(
         self, interest: Interest, number: int, token: Token | ProcessToken, *, alive: bool
     ) -> None:
-        listener, _ = interest.listeners.get(number, (None, True))
+        listener = interest.listeners.get(number)
         if listener is None:
             return
         try:

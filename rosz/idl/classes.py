@@ -368,7 +368,9 @@ def _wrap(line: str) -> list[str]:
     for chunk in _chunks(line):
         current.append(chunk)
         while len(current) > 1 and sum(len(text) for text, _ in current) > _WIDTH:
-            cut = _best_cut(current)
+            # Behind a piece as far outside as possible, and of these the last.
+            cuts = range(1, len(current))
+            cut = min(cuts, key=lambda cut: (current[cut - 1][1], -cut))
             lines.append("".join(text for text, _ in current[:cut]).rstrip())
             current = [(indent, 99), *current[cut:]]
             if len(current) == 2:  # noqa: PLR2004  # the indentation and one piece: as it is
@@ -389,9 +391,3 @@ def _chunks(line: str) -> list[tuple[str, int]]:
             chunks.append((current, depth))
             current = ""
     return [*chunks, (current, 99)]
-
-
-def _best_cut(chunks: list[tuple[str, int]]) -> int:
-    """Return the piece to break behind: as far outside as possible, then the last."""
-    cuts = range(1, len(chunks))
-    return min(cuts, key=lambda cut: (chunks[cut - 1][1], -cut))

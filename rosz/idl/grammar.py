@@ -34,12 +34,13 @@ _TYPE_WORD = re.compile(r"([^\s#]*)(?:[ \t]+([A-Za-z][A-Za-z0-9_]*))?")
 _DIGITS = re.compile(r"[0-9]+", re.ASCII)
 _SURROGATE = re.compile(r"[\ud800-\udfff]")
 _BLANK = re.compile(r"[ \t]*")
+_KEY = re.compile(r"@key\b[ \t]*")
 _SEPARATOR = "---"
 _LONGEST_INTEGER = 80  # characters; 64 binary digits are fewer
 _MOST = (1 << 32) - 1
 _INTEGER = re.compile(r"[+-]?(?:0[xX][0-9a-fA-F]+|0[bB][01]+|0[oO][0-7]+|[0-9]+)")
 _FLOAT = re.compile(
-    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?|nan)", re.IGNORECASE
+    r"(?i)[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?|inf(?:inity)?|nan)", re.ASCII
 )
 _QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
 _BARE = re.compile(r"[^\s,\]#]+")
@@ -47,6 +48,7 @@ _BARE_TEXT = re.compile(r"[^#]*[^#\s]")
 _ESCAPE = re.compile(r"\\(?:u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|(.))")
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "a": "\a", "b": "\b", "f": "\f", "v": "\v"}
 _BOOLEANS = {"true": True, "false": False, "1": True, "0": False}
+_TOO_LARGE = {"float32": 2.0**128 - 2.0**103, "float64": float("inf")}
 _STRINGS = ("string", "wstring")
 
 _MEANING = {
@@ -173,7 +175,7 @@ def _message(name: str, lines: list[str], start: int, text: str, path: str) -> M
 
 def _column(line: str, name: str) -> int:
     """Return the 1-based column of the name that a line declares."""
-    match = re.search(rf"[ \t]({re.escape(name)})\b", line)
+    match = re.search(rf"\S[ \t]+({re.escape(name)})\b", line)
     return match.start(1) + 1 if match else 0
 
 
@@ -210,7 +212,9 @@ class _DefinitionLine:
     def parse(self) -> Field | Constant | None:
         """Return the field or constant of the line; None if it has none."""
         self._skip()
-        if self._done() or self._text.startswith("@key", self._at):
+        if key := _KEY.match(self._text, self._at):
+            self._at = key.end()
+        if self._done():
             return None
         column = self._at + 1
         kind = self._type()
@@ -366,11 +370,7 @@ class _DefinitionLine:
         expected = f"expected a default of type {kind.base}"
         if bare is None:
             self._fail(expected)
-        value = self._scalar(
-            kind.base, bare[0], f"{expected}, or a comment after '#', got '{bare[0]}'"
-        )
-        self._at = bare.end()
-        return value
+        return self._bare(kind, bare, f"{expected}, or a comment after '#', got '{bare[0]}'")
 
     def _list(self, kind: FieldType) -> Value:
         start = self._at
@@ -400,14 +400,21 @@ class _DefinitionLine:
         return tuple(values)
 
     def _element(self, kind: FieldType) -> Scalar:
+        if self._done():
+            self._fail("the list is not closed; expected ']'")
         if kind.base in _STRINGS:
             return self._string(kind, _BARE)
         bare = _BARE.match(self._text, self._at)
         if bare is None:
-            if self._done():
-                self._fail("the list is not closed; expected ']'")
             self._fail(f"expected a value of type {kind.base}, got '{self._text[self._at]}'")
-        value = self._scalar(kind.base, bare[0])
+        return self._bare(kind, bare)
+
+    def _bare(self, kind: FieldType, bare: re.Match[str], wrong: str = "") -> Scalar:
+        """Return a number as default; unlike a constant of ROS 1, it may not be too large."""
+        value = self._scalar(kind.base, bare[0], wrong)
+        too_large = isinstance(value, float) and abs(value) >= _TOO_LARGE[kind.base]
+        if too_large and "n" not in bare[0].lower():  # inf, infinity
+            self._fail(f"{bare[0]} is outside the range of {kind.base}")
         self._at = bare.end()
         return value
 

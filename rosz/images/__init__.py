@@ -3,8 +3,6 @@
 Needs the extra ``rosz[vision]``. May import message classes, numpy and OpenCV.
 """
 
-from __future__ import annotations
-
 from rosz.images.arrays import convert, image_array, saturated, without_channel
 from rosz.images.encodings import Encoding, ImageError, depth_of, parse_encoding, type_of
 from rosz.images.pictures import pixels

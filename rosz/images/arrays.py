@@ -8,14 +8,7 @@ from typing import Any, TypeAlias
 import cv2
 import numpy as np
 
-from rosz.images.encodings import (
-    Encoding,
-    ImageError,
-    color_code,
-    depth_of,
-    parse_encoding,
-    type_of,
-)
+from rosz.images import encodings
 
 ImageArray: TypeAlias = Any
 """An array of numpy."""
@@ -46,7 +39,7 @@ def image_array(message: Any, encoding: str = "passthrough") -> ImageArray:
     Raises:
         ImageError: The encoding or conversion does not exist, or the data are too few.
     """
-    depth, channels = depth_of(type_of(message.encoding))
+    depth, channels = encodings.depth_of(encodings.type_of(message.encoding))
     dtype = np.dtype(_DTYPES[depth]).newbyteorder(">" if message.is_bigendian else "<")
     image = _data_array(message, dtype, channels)
     if bool(message.is_bigendian) == (sys.byteorder == "little"):
@@ -65,7 +58,7 @@ def _data_array(message: Any, dtype: np.dtype[Any], channels: int) -> ImageArray
     try:
         return np.ndarray(shape, dtype, data, strides=strides if padded else None)
     except TypeError as error:
-        raise ImageError(
+        raise encodings.ImageError(
             f"an image of {message.height} rows of {row} bytes ({message.width} pixels of"
             f" '{message.encoding}') has {len(data)} bytes: {error}"
         ) from error
@@ -88,14 +81,14 @@ def convert(source: ImageArray, encoding: str, target: str) -> ImageArray:
     image = np.asarray(source)
     if target in {"", encoding}:
         return without_channel(image).copy()
-    before, after = parse_encoding(encoding), parse_encoding(target)
-    code = color_code(before, after)
+    before, after = encodings.parse_encoding(encoding), encodings.parse_encoding(target)
+    code = encodings.color_code(before, after)
     if code is None:
         return _deepened(without_channel(image), before, after).copy()
     try:
         image = cv2.cvtColor(image, code)
     except cv2.error as error:
-        raise ImageError(
+        raise encodings.ImageError(
             f"an image of shape {image.shape} and type {image.dtype} does not convert from"
             f" '{encoding}' to '{target}': {error}"
         ) from error
@@ -107,9 +100,11 @@ def without_channel(image: ImageArray) -> ImageArray:
     return image[..., 0] if image.ndim == 3 and image.shape[2] == 1 else image  # noqa: PLR2004
 
 
-def _deepened(image: ImageArray, before: Encoding, after: Encoding) -> ImageArray:
+def _deepened(
+    image: ImageArray, before: encodings.Encoding, after: encodings.Encoding
+) -> ImageArray:
     """Return an image with the depth of another encoding."""
-    kind: Any = _DTYPES[depth_of(type_of(after.name))[0]]
+    kind: Any = _DTYPES[encodings.depth_of(encodings.type_of(after.name))[0]]
     bits = before.bits, after.bits
     if bits == (8, 16):
         if image.dtype == np.uint8 and kind is np.uint16:

@@ -1,10 +1,10 @@
 """Inspect a running system, as the commands do: list, measure, send and query.
 
 ``connect`` opens the session of a command, and ``survey`` takes a snapshot of the network;
-``topics``, ``services``, ``nodes`` and ``definitions`` list and describe the
-system, as ROS 1's tools do. ``subscribe``, ``fields``, ``echo``, ``measure`` and ``rosout`` follow
-topics; ``arguments`` and ``publish`` send messages that are written as YAML. The names are imported
-on first use, since a command has to start fast.
+``topics``, ``services``, ``nodes``, ``parameters`` and ``definitions`` list and describe a system,
+as ROS 1's tools do. ``subscribe``, ``fields``, ``echo``, ``measure`` and ``rosout`` follow topics;
+``arguments`` and ``publish`` send messages that are written as YAML. The names are imported on
+first use, since a command has to start fast.
 """
 
 from __future__ import annotations
@@ -60,6 +60,7 @@ if TYPE_CHECKING:
         ping,
         set_level,
     )
+    from rosz.introspect.parameters import ParameterTree
     from rosz.introspect.publish import DEFAULT_RATE, ONCE_SECONDS, Sender, SendOptions
     from rosz.introspect.rosout import (
         GATHERED,
@@ -101,28 +102,4 @@ if TYPE_CHECKING:
         topics_of_type,
     )
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "arguments": "list_arguments make_message read_arguments read_file read_stream"
-            " with_arguments",
-            "connect": "command_config find_unreached open_context open_session",
-            "definitions": "Definitions",
-            "echo": "Echo EchoOptions dump_bytes plot_columns plot_values shorten",
-            "fields": "FieldPath Filter FilterFailed Loader Target find_target",
-            "measure": "BandwidthMeter BandwidthStats DelayMeter DelayStats RateMeter"
-            " format_bandwidth format_delay format_rate format_rates read_stamp",
-            "nodes": "PING_TIMEOUT NodeEntry find_nodes format_connections format_node get_info"
-            " get_levels kill kill_nodes list_nodes machines nodes_on_machine ping set_level",
-            "publish": "DEFAULT_RATE ONCE_SECONDS Sender SendOptions",
-            "rosout": "GATHERED LOGS LogFilter LogLine format_line is_log read_line to_ros1_log"
-            " to_ros2_log",
-            "services": "call_service find_server list_services service_key services_of_type"
-            " wait_for_server",
-            "subscribe": "find_class find_token resolve_field subscribe_samples topic_types"
-            " wait_for_target",
-            "survey": "Survey process_address take_survey",
-            "topics": "Topic by_host entity_row find_topic format_topic format_topics in_namespace"
-            " list_topics topics_of_type",
-        },
-    )
+    __getattr__ = exports_of(__name__)

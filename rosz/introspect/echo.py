@@ -15,6 +15,7 @@ import msgspec
 
 from rosz.introspect.fields import FieldPath, Filter
 from rosz.message import Message, strify_message, to_jsonable
+from rosz.names import printable
 from rosz.time import DurationValue, TimeValue
 
 _CLEAR = "\033[2J\033[;H"
@@ -46,7 +47,7 @@ class EchoOptions(msgspec.Struct, frozen=True, kw_only=True):
     condition: Filter | None = None
 
 
-class Echo:
+class Echo(msgspec.Struct, eq=False):
     """Formats the messages of one topic.
 
     Args:
@@ -57,21 +58,12 @@ class Echo:
         now: Function that returns ROS time in nanoseconds.
     """
 
-    def __init__(
-        self,
-        topic: str,
-        type_name: str,
-        path: FieldPath,
-        options: EchoOptions,
-        now: Callable[[], int],
-    ) -> None:
-        self._topic = topic
-        self._type_name = type_name
-        self._path = path
-        self._options = options
-        self._now = now
-        self._shortened = options.no_arrays or options.no_strings
-        self._has_head = False
+    _topic: str
+    _type_name: str
+    _path: FieldPath
+    _options: EchoOptions
+    _now: Callable[[], int]
+    _has_head: bool = False
 
     def text(self, message: Any) -> str | None:
         """Return the text of a message to print; None if the filter refuses it.
@@ -86,11 +78,11 @@ class Echo:
         value = self._path.read(message)
         if self._options.plot:
             return self._plot(value)
-        if self._shortened:
-            no_arrays, no_strings = self._options.no_arrays, self._options.no_strings
+        no_arrays, no_strings = self._options.no_arrays, self._options.no_strings
+        if no_arrays or no_strings:
             value = shorten(value, self._type_name, no_arrays, no_strings)
         if self._options.as_json:
-            return msgspec.json.encode(to_jsonable(value)).decode() + "\n"
+            return printable(msgspec.json.encode(to_jsonable(value)).decode() + "\n")
         return self._yaml(value)
 
     def _yaml(self, value: Any) -> str:
@@ -204,7 +196,7 @@ def plot_values(value: Any, offset: int, fields: FieldNames) -> Iterator[str]:
         for item in value:
             yield from plot_values(item, offset, fields)
     elif not isinstance(value, bytes):
-        yield str(value)
+        yield printable(str(value))
 
 
 def _inner(message: Message, fields: FieldNames) -> Iterator[tuple[str, Any]]:

@@ -19,6 +19,7 @@ from rosz.message import Message, Slot, ros1_slots, slot_type, slots
 from rosz.names import short_type
 
 _STEP = re.compile(r"(\w+)(?:\[([^\]]*)\])?")
+_COLON = re.compile(r":(?![^\[]*\])")  # not one in an index
 _MOST_SLICE_PARTS = 3
 _FEW = 100
 
@@ -42,6 +43,12 @@ class FieldPath:
     Raises:
         UsageError: The text does not have that form.
     """
+
+    @staticmethod
+    def spell_out(word: str) -> list[str]:
+        """Return what a word names: ``/a/x`` and ``/a/y`` for ``/a/x:y``, as in rqt_plot."""
+        first, *others = [part for part in _COLON.split(word) if part] or [word]
+        return [first, *(f"{first.rpartition('/')[0]}/{other}" for other in others)]
 
     def __init__(self, text: str) -> None:
         self.text = text.strip("/")

@@ -282,3 +282,10 @@ def set_level(session: Session, node: Token, logger: str, level: str) -> None:
     from rosz.node import Request
 
     query_node(session, node, Request("set_level", logger=logger, level=level), bool)
+
+
+def follow_clock(session: Session, node: Token) -> None:
+    """Let a node look at its ``use_sim_time`` again; errors as those of `query_node`."""
+    from rosz.node import Request
+
+    query_node(session, node, Request("follow_clock"), bool)

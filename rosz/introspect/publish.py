@@ -37,7 +37,7 @@ class SendOptions(msgspec.Struct, frozen=True, kw_only=True):
     ros_time: bool = False
 
 
-class Sender:
+class Sender(msgspec.Struct, eq=False):
     """Publishes messages on one topic until it has sent them, or the context is shut down.
 
     Args:
@@ -47,17 +47,10 @@ class Sender:
         report: Function called with each line of progress.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        publisher: Publisher[Any],
-        options: SendOptions,
-        report: Callable[[str], object],
-    ) -> None:
-        self._node = node
-        self._publisher = publisher
-        self._options = options
-        self._report = report
+    _node: Node
+    _publisher: Publisher[Any]
+    _options: SendOptions
+    _report: Callable[[str], object]
 
     def send(self, arguments: Sequence[Any]) -> None:
         """Send the message of command-line arguments.

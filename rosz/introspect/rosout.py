@@ -26,9 +26,6 @@ GATHERED = "/rosout_agg"
 _LEVELS = ((10, 1), (20, 2), (30, 4), (40, 8), (50, 16))
 """Levels of ROS 2 and ROS 1, by severity."""
 
-_COLORS = {"DEBUG": "\033[32m", "WARN": "\033[33m", "ERROR": "\033[31m", "FATAL": "\033[31m"}
-_RESET = "\033[0m"
-
 
 class LogLine(msgspec.Struct, frozen=True):
     """A line of the log.
@@ -110,19 +107,17 @@ class LogFilter:
         )
 
 
-def format_line(line: LogLine, *, color: bool = False, verbose: bool = False) -> str:
+def format_line(line: LogLine, *, verbose: bool = False) -> str:
     """Return a line as text.
 
     Args:
         line: The line.
-        color: Whether to colour it by its level.
         verbose: Whether to add its place in the source.
     """
     text = f"[{line.level}] [{line.stamp:.6f}] [{line.node}]: {line.text}"
     if verbose:
         text += f"\n    at {line.file}:{line.line} in {line.function}"
-    mark = _COLORS.get(line.level) if color else None
-    return f"{mark}{text}{_RESET}" if mark else text
+    return text
 
 
 def is_log(topic: str, cls: Any) -> bool:

@@ -78,6 +78,7 @@ def take_survey(
     processes: bool = False,
     dropped: bool = False,
     timeout: float = _REPLY_TIMEOUT,
+    looks: int = 1,
 ) -> Survey:
     """Query the network for the nodes of a domain.
 
@@ -88,24 +89,25 @@ def take_survey(
         processes: Whether to query processes as well.
         dropped: Whether to query the counts of dropped samples as well.
         timeout: Seconds to wait for tokens, of which those that came by then count.
+        looks: Number of queries that are united, each with this time limit.
 
     Raises:
         ClosedError: The session is closed.
         WaitTimeout: The replies do not end in time.
     """
     damaged: list[str] = []
-    keys = session.live_tokens(tokens_key(domain), timeout)
-    tokens = list(_read(keys, parse_token, damaged))
+    keys = session.live_tokens(tokens_key(domain), timeout, looks)
+    tokens = list(read_keys(keys, parse_token, damaged))
     if nodes and not {token.node_name for token in tokens}.issuperset(nodes):
         damaged.clear()
         keys = session.live_tokens(tokens_key(domain), _SEARCH_TIMEOUT)
-        tokens = list(_read(keys, parse_token, damaged))
+        tokens = list(read_keys(keys, parse_token, damaged))
     by_node: dict[tuple[str, int], ProcessToken] = {}
     if processes:
-        keys = session.live_tokens(processes_key(domain), timeout)
+        keys = session.live_tokens(processes_key(domain), timeout, looks)
         by_node = {
             (process.zid, process.node_id): process
-            for process in _read(keys, parse_process, damaged)
+            for process in read_keys(keys, parse_process, damaged)
         }
     counts = dict(_read_dropped(session, domain, damaged)) if dropped else {}
     return Survey(domain, View(tokens), by_node, tuple(damaged), counts)
@@ -127,7 +129,8 @@ def _read_dropped(
             yield (zid, entity_id), count
 
 
-def _read(keys: Iterable[str], parse: Callable[[str], T], damaged: list[str]) -> Iterator[T]:
+def read_keys(keys: Iterable[str], parse: Callable[[str], T], damaged: list[str]) -> Iterator[T]:
+    """Yield what keys say; those that cannot be parsed are left out, and the reasons added."""
     for key in keys:
         try:
             yield parse(key)

@@ -56,20 +56,7 @@ if TYPE_CHECKING:
     from rosz.message.transcode import compile_from_cdr, compile_transcoder
     from rosz.message.tuples import tuple_decoder
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "convert": "fill_message_args from_json from_plain from_yaml shown_name to_json"
-            " to_jsonable to_plain to_yaml",
-            "decoder_source": "DecoderSource",
-            "encoder_source": "EncoderSource",
-            "sequences": "numbers",
-            "source_names": "SourceNames",
-            "text": "strify_message",
-            "transcode": "compile_from_cdr compile_transcoder",
-            "tuples": "tuple_decoder",
-        },
-    )
+    __getattr__ = exports_of(__name__)
 
 __all__ = (
     "ARRAY_CODES",

@@ -1,8 +1,7 @@
 """Messages from and to plain values, JSON and YAML.
 
-Filling a message is lenient where a person writes and strict where a mistake hides: fields may be
-left out or stand in a list by position, times may be ``now`` and headers ``auto``; but an unknown
-field, or a value of another kind, is an error that names the field.
+What fills a message may leave fields out, or list them by position; a time may be ``now``, and a
+header ``auto``. An unknown field, or a value of another kind, is an error that names the field.
 """
 
 from __future__ import annotations
@@ -38,8 +37,8 @@ def fill_message_args(msg: Message, msg_args: Any, keys: Mapping[str, Any] | Non
         msg: The message.
         msg_args: A dict of fields; a list with one such dict; a list of all fields in order; or
             None, which is an empty list.
-        keys: Values by the names that stand for them where a time, a duration or a message is
-            expected. With ``now`` among them, ``auto`` is a header with that time.
+        keys: Times, durations and messages, by the texts that stand for them. If ``now`` is one
+            of these, ``auto`` is a header with that time.
 
     Raises:
         EncodeError: A name is not a field of its message, a value does not fit its field, or the
@@ -49,13 +48,13 @@ def fill_message_args(msg: Message, msg_args: Any, keys: Mapping[str, Any] | Non
 
 
 def _sole(values: Any) -> Any:
-    """Return the dict in a list that has nothing else; any other value as it is."""
+    """Return the only element of a list if it is a dict, else the value itself."""
     sole = isinstance(values, list) and len(values) == 1 and isinstance(values[0], dict)
     return values[0] if sole else values
 
 
 def shown_name(name: str) -> str:
-    """Return the name that a field has in its definition: Python's keywords without the ``_``."""
+    """Return the name of a field in its definition: without the ``_`` after a keyword of Python."""
     bare = name.removesuffix("_")
     return bare if keyword.iskeyword(bare) else name
 
@@ -113,7 +112,7 @@ class _Filler(NamedTuple):
 
     def _value(self, slot: Slot, value: Any, path: str, owner: Message) -> Any:
         if slot.shape == "one":
-            return self._one(slot, value, path, getattr(owner, slot.name))
+            return self._element(slot, value, path, getattr(owner, slot.name))
         if isinstance(slot.kind, str) and slot.kind in OCTETS and isinstance(value, str):
             try:
                 value = base64.b64decode(value, validate=True)
@@ -132,7 +131,7 @@ class _Filler(NamedTuple):
         if isinstance(slot.kind, str) and slot.kind in OCTETS and isinstance(value, bytes):
             return value
         elements = [
-            self._one(slot, item, f"{path}[{index}]", None) for index, item in enumerate(value)
+            self._element(slot, item, f"{path}[{index}]", None) for index, item in enumerate(value)
         ]
         if isinstance(slot.kind, str):
             if slot.kind in OCTETS:
@@ -145,7 +144,7 @@ class _Filler(NamedTuple):
                     self._refuse(path, f"elements in the range of {slot.kind}", value)
         return elements
 
-    def _one(self, slot: Slot, value: Any, path: str, before: Any) -> Any:
+    def _element(self, slot: Slot, value: Any, path: str, before: Any) -> Any:
         kind = slot.kind
         if not isinstance(kind, str):
             return self._message(kind, value, path, before)
@@ -284,8 +283,8 @@ def from_plain(
         cls: Class of the message.
         value: A dict of some fields, a list of all fields in order, or None for the defaults.
         now: Meaning of ``now`` and ``auto``; none when not given.
-        null_is_nan: Whether None is NaN in a field for floating-point numbers; it is an error if
-            not. JavaScript writes numbers that are not finite as ``null``.
+        null_is_nan: Whether None in a floating-point field is NaN, not an error: JavaScript writes
+            numbers that are not finite as ``null``.
 
     Raises:
         EncodeError: A name is not a field of its message, or a value does not fit its field.

@@ -10,15 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rosz.message.offsets import (
-    Elements,
-    Phase,
-    Walk,
-    alignment_of,
-    in_run,
-    join_codes,
-    size_of,
-)
+from rosz.message.offsets import Elements, Phase, Walk, alignment_of, in_run, join_codes, size_of
 from rosz.message.schema import ARRAY_CODES, OCTETS, SCALAR_CODES, Slot
 from rosz.message.source_names import LocalNames, SourceNames
 

@@ -26,6 +26,7 @@ from rosz.message.sequences import (
     read_wide,
 )
 
+# The modules that users generate are checked with their settings: a name counts as exported here.
 __all__ = (
     "FAULTS",
     "PADDING",
@@ -115,9 +116,9 @@ Stride: TypeAlias = _Packers[tuple[Callable[..., bytes], int]]
 """Packers with the offset after the run."""
 
 
-def read_flags(octets: bytes) -> list[bool]:
+def read_flags(data: bytes) -> list[bool]:
     """Return octets as a list of bool."""
-    return memoryview(octets).cast("?").tolist() if octets else []  # type: ignore[return-value]
+    return memoryview(data).cast("?").tolist() if data else []  # type: ignore[return-value]
 
 
 def read_block(code: str, data: bytes, start: int, end: int) -> array[Any]:

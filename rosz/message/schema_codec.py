@@ -21,14 +21,7 @@ from rosz.message.schema import (
     SCALAR_SIZES,
     Slot,
 )
-from rosz.message.sequences import (
-    TRUTH,
-    flags,
-    numbers,
-    octets,
-    pack_wide,
-    read_wide,
-)
+from rosz.message.sequences import TRUTH, flags, numbers, octets, pack_wide, read_wide
 
 _T = TypeVar("_T")
 

@@ -5,7 +5,7 @@ that only nodes of ROS 2 have.
 """
 
 from rosz.node.client import Client
-from rosz.node.clock import Clock
+from rosz.node.clock import Clock, TimeJump
 from rosz.node.context import Context
 from rosz.node.control import NodeInfo, Request, control_key
 from rosz.node.decoder import MessageInfo
@@ -51,6 +51,7 @@ __all__ = (
     "Service",
     "SubscriberLink",
     "Subscription",
+    "TimeJump",
     "Timer",
     "TimerEvent",
     "control_key",

@@ -19,7 +19,7 @@ from rosz.errors import (
     near_miss,
 )
 from rosz.node.core import NodeCore
-from rosz.node.entity import Entity
+from rosz.node.entity import Entity, Introspect
 from rosz.node.incompatible import explain_incompatible
 from rosz.qos import QoS
 from rosz.session import Cancellation, Reply, clamp_timeout
@@ -54,6 +54,9 @@ class Client(Entity):
 
     A server of ROS 2 drops the oldest request when more of them wait than the depth of its QoS. So
     no more calls than that are on their way to one at any time; others wait for their turn.
+
+    Attributes:
+        introspect: Function called with each request that is sent, and each response received.
     """
 
     def __init__(
@@ -70,6 +73,7 @@ class Client(Entity):
         self._known: tuple[View | None, bool, int] = None, False, _ANY_NUMBER
         self._on_their_way = 0
         self._turn = threading.Condition()
+        self.introspect: Introspect | None = None
         self._querier = self.keep(
             node.context.session.querier(self.key, timeout=self.timeout, target="all_complete")
         )
@@ -107,15 +111,20 @@ class Client(Entity):
         """
         limit = self.timeout if timeout is None else clamp_timeout(timeout)
         deadline = time.monotonic() + limit
-        payload = self.service_type.Request._encode(request)
+        payload, number = self.service_type.Request._encode(request), next(self._numbers)
         if not self.served:
             self._find_server(limit)
         with self._taking_turns(deadline, limit):
+            if self.introspect is not None:
+                self.introspect("REQUEST_SENT", self.gid, number, request)
             for _ in range(_ATTEMPTS):
                 began = time.monotonic()
-                reply = self._attempt(payload, deadline, limit)
+                reply = self._attempt(payload, number, deadline, limit)
                 if reply is not None:
-                    return self._response(reply, limit)
+                    response = self._response(reply, limit)
+                    if self.introspect is not None:
+                        self.introspect("RESPONSE_RECEIVED", self.gid, number, response)
+                    return response
                 # The query reached nobody: the route to a server may come a moment after its token.
                 # A server that got the request and then ended may have done the work: it does not
                 # get the request again.
@@ -151,13 +160,13 @@ class Client(Entity):
                 )
         return "the server ended before it answered"
 
-    def _attempt(self, payload: bytes, deadline: float, limit: float) -> Reply | None:
+    def _attempt(self, payload: bytes, number: int, deadline: float, limit: float) -> Reply | None:
         """Send the request once; ``None`` if the query ended without a reply."""
         left = deadline - time.monotonic()
         if left <= 0:
             raise self._late(limit)
         self.check_open("call")
-        attachment = pack_attachment(next(self._numbers), time.time_ns(), self.gid)
+        attachment = pack_attachment(number, time.time_ns(), self.gid)
         if abs(self._querier.timeout - left) < _SAME:
             replies = self._querier.query(payload, attachment, self._cancel)
         else:

@@ -1,8 +1,9 @@
 """Wall and ROS time, and sleeping in it.
 
-A clock and all its branches share one source of time: the clock of the context, those of its nodes,
-and those of their timers. Each can be closed by itself, which ends the sleeps on it and on its
-branches at once.
+A clock and its branches share one source of time: that of a node and those of its timers. The clock
+of a node is itself a branch of that of the context, but with a source of its own, since each node
+may take its time from ``/clock``. Each can be closed by itself, which ends the sleeps on it and on
+its branches at once.
 
 A sleep adds itself to a set, looks at the time and the state of the clock once more, and only then
 waits, on a lock of its own that is released to wake it. So no wake-up is lost, nothing polls, and a
@@ -15,7 +16,9 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import msgspec
 
@@ -44,15 +47,29 @@ class TimeJump(msgspec.Struct, frozen=True):
     Attributes:
         before: ROS time before the jump, in nanoseconds.
         after: ROS time after the jump, in nanoseconds.
+        switched: Whether ROS time is simulated now and was not before, or the other way round.
     """
 
     before: int
     after: int
+    switched: bool = False
 
     @property
     def delta(self) -> int:
         """Size of the jump in nanoseconds; negative if time moved back."""
         return self.after - self.before
+
+
+def _is_back(jump: TimeJump) -> bool:
+    return jump.delta < 0
+
+
+class _Observer(msgspec.Struct, frozen=True, eq=False):
+    """The functions that a caller of `Clock.on_jump` gave."""
+
+    wanted: Callable[[TimeJump], bool]
+    before: Callable[[], object] | None
+    after: Callable[[TimeJump], object]
 
 
 class _Sleeper:
@@ -76,15 +93,14 @@ class _Sleeper:
 class _TimeSource:
     """The time that a clock and its branches share."""
 
-    __slots__ = ("advancing", "last", "now", "observers", "simulated", "sleepers")
+    __slots__ = ("__weakref__", "advancing", "now", "observers", "simulated", "sleepers")
 
     def __init__(self) -> None:
         self.now = 0
         self.simulated = False
         self.sleepers: set[_Sleeper] = set()
-        self.observers: list[tuple[Callable[[TimeJump], None], int | None]] = []
+        self.observers: list[_Observer] = []
         self.advancing = threading.Lock()
-        self.last: tuple[bytes, int] = b"", 0
 
     def wake(self, sleeper: _Sleeper, now: int) -> None:
         """End a sleep, unless another thread just did."""
@@ -104,13 +120,21 @@ class Clock:
 
     def __init__(self) -> None:
         self._source = _TimeSource()
+        self._others: weakref.WeakSet[_TimeSource] = weakref.WeakSet()
         self._parent: Clock | None = None
         self._closed = False
 
-    def branch(self) -> Clock:
-        """Return a clock of the same time that is closed with this one, or alone."""
+    def branch(self, *, apart: bool = False) -> Clock:
+        """Return a clock that is closed with this one, or alone.
+
+        Args:
+            apart: Whether it has a time of its own, which may be simulated while this one is not.
+        """
         clock = Clock()
-        clock._source = self._source
+        if apart:
+            self._others.add(clock._source)
+        else:
+            clock._source = self._source
         clock._parent = self
         return clock
 
@@ -146,19 +170,31 @@ class Clock:
 
         Sleeps that have begun end by wall time.
         """
-        self._source.simulated = True
+        self._switch(simulated=True)
 
-    def advance(self, time_ns: int, *, publisher: bytes = b"", number: int = 0) -> None:
+    def disable_simulation(self) -> None:
+        """Take wall time again. A sleep that has begun goes on in wall time."""
+        self._switch(simulated=False)
+
+    def _switch(self, *, simulated: bool) -> None:
+        source = self._source
+        with source.advancing:
+            if source.simulated is simulated:
+                return
+            jump = TimeJump(self.now(), 0 if simulated else time.time_ns(), switched=True)
+            observers, errors = self._prepare(jump)
+            if simulated:
+                source.now = 0
+            source.simulated = simulated
+            for sleeper in () if simulated else list(source.sleepers):
+                source.wake(sleeper, source.now)
+        self._report(jump, observers, errors)
+
+    def advance(self, time_ns: int) -> None:
         """Set ROS time, and wake the sleeps whose time has come.
-
-        Each node of a context receives ``/clock`` on a thread of its own, and one that lags behind
-        the others must not set time back. So publishers number their messages, from 1, and a
-        message older than the last one of the same publisher is ignored.
 
         Args:
             time_ns: Time in nanoseconds; may be earlier than before, as when a simulation restarts.
-            publisher: Gid of the publisher of the time.
-            number: Number of its message; 0 if it does not count.
 
         Raises:
             UsageError: Time is not simulated, or `time_ns` is negative.
@@ -170,32 +206,34 @@ class Clock:
         if time_ns < 0:
             raise UsageError(f"ROS time cannot be '{time_ns}' ns: expected 0 or more")
         with source.advancing:
-            last_publisher, last = source.last
-            if publisher == last_publisher and 0 < number <= last:
-                return
-            source.last = publisher, number
-            before, source.now = source.now, time_ns
+            jump = TimeJump(source.now, time_ns)
+            observers, errors = self._prepare(jump) if source.now else ([], [])
+            source.now = time_ns
             for sleeper in list(source.sleepers):
                 if sleeper.is_due(time_ns):
                     source.wake(sleeper, time_ns)
-        if before:
-            self._report(TimeJump(before, time_ns))
+        self._report(jump, observers, errors)
 
     def on_jump(
-        self, observer: Callable[[TimeJump], None], *, forward_ns: int | None = None
+        self,
+        observer: Callable[[TimeJump], object],
+        *,
+        wanted: Callable[[TimeJump], bool] = _is_back,
+        before: Callable[[], object] | None = None,
     ) -> Callable[[], None]:
-        """Call a function when ROS time jumps back, or far enough forward.
+        """Call a function when ROS time jumps.
 
-        It is called on the thread that advances the clock, after the time is set.
+        It is called on the thread that sets the time, after that.
 
         Args:
             observer: Function that gets the jump.
-            forward_ns: Smallest step forward that counts as a jump; none does when not given.
+            wanted: Function that tells whether a step of time is a jump; one back is by default.
+            before: Function to call before the time is set.
 
         Returns:
             A function that removes the observer.
         """
-        entry = (observer, forward_ns)
+        entry = _Observer(wanted, before, observer)
         observers = self._source.observers
         observers.append(entry)
 
@@ -227,10 +265,15 @@ class Clock:
         Raises:
             TimeMovedBackwards: ROS time became earlier than it was when the sleep began.
         """
-        if not self._source.simulated:
-            return self._sleep_wall(duration_ns)
-        start = self._await_start()
-        return start is not None and self._await(start, start + duration_ns) is not None
+        if self._source.simulated:
+            start = self._await_start()
+            end = None if start is None else self._await(start, start + duration_ns)
+            if start is None or end is None:
+                return False
+            if self._source.simulated:
+                return True
+            duration_ns -= end - start
+        return self._sleep_wall(duration_ns)
 
     def sleep_until(self, time_ns: int) -> bool:
         """Sleep until a time comes.
@@ -247,18 +290,21 @@ class Clock:
         Raises:
             TimeMovedBackwards: ROS time became earlier than it was when the sleep began.
         """
-        if not self._source.simulated:
-            return self._sleep_wall(time_ns - time.time_ns())
-        start = self._await_start()
-        return start is not None and self._await(start, time_ns) is not None
+        if self._source.simulated:
+            start = self._await_start()
+            if start is None or self._await(start, time_ns) is None:
+                return False
+            if self._source.simulated:
+                return True
+        return self._sleep_wall(time_ns - time.time_ns())
 
     def close(self) -> None:
         """End all sleeps on this clock and its branches, later ones too; again has no effect."""
         self._closed = True
-        source = self._source
-        for sleeper in list(source.sleepers):
-            if sleeper.clock.closed:
-                source.wake(sleeper, source.now)
+        for source in (self._source, *self._others):
+            for sleeper in list(source.sleepers):
+                if sleeper.clock.closed:
+                    source.wake(sleeper, source.now)
 
     def _sleep_wall(self, duration_ns: int) -> bool:
         if duration_ns <= 0:
@@ -282,13 +328,16 @@ class Clock:
         return self._source.now or self._await(0, 1)
 
     def _await(self, start: int, target: int) -> int | None:
-        """Wait for a ROS time and return the one that ended the wait; None if closed."""
+        """Wait for a ROS time and return the one that ended the wait; None if closed.
+
+        The wait also ends when time is simulated no longer.
+        """
         source = self._source
         sleeper = _Sleeper(self, start, target)
         source.sleepers.add(sleeper)
         try:
             now = source.now
-            if not sleeper.is_due(now) and not self.closed:
+            if source.simulated and not sleeper.is_due(now) and not self.closed:
                 sleeper.lock.acquire()
                 now = sleeper.woken
         finally:
@@ -299,13 +348,23 @@ class Clock:
             raise TimeMovedBackwards(start, now)
         return now
 
-    def _report(self, jump: TimeJump) -> None:
-        errors: list[Exception] = []
-        for observer, forward_ns in list(self._source.observers):
-            if jump.delta < 0 or (forward_ns is not None and jump.delta >= forward_ns):
-                try:
-                    observer(jump)
-                except Exception as error:  # noqa: BLE001  # raised together below
-                    errors.append(error)
+    def _prepare(self, jump: TimeJump) -> tuple[list[_Observer], list[Exception]]:
+        """Return the observers of a jump that is about to come, and what they raised."""
+        observers = [entry for entry in self._source.observers if entry.wanted(jump)]
+        return observers, _raised_by(entry.before for entry in observers if entry.before)
+
+    def _report(self, jump: TimeJump, observers: list[_Observer], errors: list[Exception]) -> None:
+        errors += _raised_by(partial(entry.after, jump) for entry in observers)
         if errors:
             raise ExceptionGroup("observers of a jump of time failed", errors)
+
+
+def _raised_by(calls: Iterable[Callable[[], object]]) -> list[Exception]:
+    """Call all functions, and return what they raise."""
+    errors: list[Exception] = []
+    for call in calls:
+        try:
+            call()
+        except Exception as error:  # noqa: BLE001  # the caller raises all of them together
+            errors.append(error)
+    return errors

@@ -60,7 +60,7 @@ class Context(Closing):
     Attributes:
         session: The session.
         graph: The graph of the domain.
-        clock: ROS time.
+        clock: Wall time; the clocks of nodes are branches of it, whose time may be simulated.
         mesh: Readiness of the session: whether it is linked to all its neighbours.
         direct_delivery: Samples for single subscriptions of this process.
         dropped: Counts of dropped samples.
@@ -114,8 +114,9 @@ class Context(Closing):
         with InterruptDeferral(self.close):
             self.session: Session = Session.open(config, peers)
             try:
-                expected = peers.is_any_running
-                self._join_network(config, alone=alone, expected=expected)
+                # Of two that begin at once, neither may have seen the other one before.
+                expected = self.session.others.is_any_running
+                self._join_network(config, alone=alone and not expected, expected=expected)
             except BaseException:
                 self.session.close()
                 raise

@@ -17,6 +17,7 @@ import msgspec
 from rosz.errors import RoszError
 from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
+from rosz.node.standard import follow_clock
 from rosz.session import Query
 from rosz.wire import ProcessToken, nodes_key, own_key, parse_token
 from rosz.worker import Worker, start_thread
@@ -59,7 +60,8 @@ class Request(msgspec.Struct, frozen=True):
     """A request to a node.
 
     Attributes:
-        action: ``info``, ``shutdown``, ``levels`` or ``set_level``.
+        action: ``info``, ``shutdown``, ``levels``, ``set_level``, or ``follow_clock`` after
+            a change of the node's ``use_sim_time``.
         reason: Reason of a ``shutdown``.
         logger: Name of the logger for ``set_level``.
         level: Name of the level for ``set_level``.
@@ -91,8 +93,8 @@ def serve_control(node: NodeCore) -> None:
                 threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True)
             )
 
-    queryable = node.keep(context.session.pull_queryable(key, rare=True))
-    Worker(f"rosz-control{node.name}", serve, receive=queryable.receive, threads=_THREADS)
+    worker = node.keep(Worker[Query](f"rosz-control{node.name}", serve, threads=_THREADS))
+    node.keep(context.session.queryable(key, worker.submit))
 
 
 def _serve(node: NodeCore, key: str, query: Query) -> str:
@@ -123,6 +125,10 @@ def _respond(node: NodeCore, request: Request) -> tuple[Any, str]:
             return node.log.get_levels(), ""
         case "set_level":
             node.log.set_level(request.logger, request.level)
+            return True, ""
+        case "follow_clock":
+            if node.parameter_owner is None:
+                follow_clock(node)
             return True, ""
         case other:
             raise ValueError(f"a node has no action '{other}'")

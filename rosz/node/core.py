@@ -54,6 +54,7 @@ class NodeCore(Closing):
         node_id: Number of the node within its session.
         began: Time of the start by the monotonic clock, in seconds.
         clock: Clock of the node, closed with it.
+        time_topic: Subscription of ``/clock``, while time is simulated.
         log: Log of the node.
         process: Token of the process of the node.
         program: The program that made the node, if the process runs several.
@@ -108,7 +109,8 @@ class NodeCore(Closing):
             socket.gethostname(),
             self.name,
         )
-        self.clock: Clock = context.clock.branch()
+        self.clock: Clock = context.clock.branch(apart=True)
+        self.time_topic: Closable | None = None
         self.log: NodeLog = NodeLog(
             self.name,
             clock=self.clock,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -25,6 +26,9 @@ _DEEPEST = (1 << 63) - 1
 """Samples beyond which other implementations cannot count."""
 
 P = TypeVar("P", bound=Closable)
+Introspect = Callable[[str, bytes, int, Any], object]
+"""Function that gets an event of a service: its name as in `service_msgs/ServiceEventInfo`, the GID
+of the client, the number of the request, and the request or response."""
 
 
 class Entity(Closing):

@@ -14,8 +14,10 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
+from itertools import takewhile
 from typing import NamedTuple
 
 import msgspec
@@ -118,6 +120,9 @@ class FetchableSamples:
         depth: The number of samples to keep; ``None`` to wait for room instead, at most 5 seconds.
         report_dropped: Function called with the node of a subscription for each sample that it has
             not fetched before newer ones took its place.
+
+    Attributes:
+        to_publish: Whether there are subscriptions of ROS 2, which receive only published samples.
     """
 
     def __init__(
@@ -134,7 +139,7 @@ class FetchableSamples:
         self._view: View | None = None
         self._near: list[str] = []
         self._far: dict[str, Token] = {}
-        self._foreign = False
+        self.to_publish: bool = False
         self._gone: dict[str, float] = {}
         self._last = 0
         self._published = False
@@ -149,19 +154,19 @@ class FetchableSamples:
         self._queryable: Queryable | None = None
         self._announcing = False
 
-    @property
-    def needed(self) -> bool:
-        """Whether subscriptions on other machines have to fetch the samples."""
-        self._look()
-        if self._far:
-            return True
+    def drop_unneeded(self) -> bool:
+        """Drop what nobody needs; return whether other machines have to fetch the samples."""
+        view = self._publisher.others.view()
         with self._lock:
+            if view is not self._view:
+                self._sort(view)
             now = time.monotonic()
             self._gone = {k: t for k, t in self._gone.items() if now - t < _RETURN_SECONDS}
-            if not self._gone:
-                self._kept.clear()
-                self._bytes = 0
-            return bool(self._gone)
+            waiting = (*self._far, *self._gone)
+            done = min((self._done.get(key, self._last) for key in waiting), default=self._last)
+            for number in list(takewhile(lambda number: number <= done, self._kept)):
+                self._bytes -= len(self._kept.pop(number)[0])
+            return bool(waiting)
 
     @property
     def undecided(self) -> bool:
@@ -179,18 +184,6 @@ class FetchableSamples:
 
         self._worker.submit(check)
 
-    @property
-    def to_publish(self) -> bool:
-        """Whether there are subscriptions of ROS 2, which receive only published samples."""
-        self._look()
-        return self._foreign
-
-    def _look(self) -> None:
-        view = self._publisher.others.view()
-        if view is not self._view:
-            with self._lock:
-                self._sort(view)
-
     def _sort(self, view: View) -> None:
         """Sort the subscriptions into those of this machine and those of others."""
         publisher = self._publisher
@@ -206,7 +199,7 @@ class FetchableSamples:
                 near.append(key)
             else:
                 far[key] = token
-        self._foreign = foreign
+        self.to_publish = foreign
         gone = dict.fromkeys(self._far.keys() - far.keys(), time.monotonic())
         self._gone = {key: t for key, t in (self._gone | gone).items() if key not in far}
         for key in gone:
@@ -230,7 +223,7 @@ class FetchableSamples:
             ClosedError: The publisher is closed.
         """
         if self._waits:
-            self._wait_for_room()
+            self._wait_for_room(len(payload))
         with self._lock:
             if self._queryable is None:
                 self._queryable = self._context.session.pull_queryable(self._key)
@@ -254,13 +247,15 @@ class FetchableSamples:
         if first:
             self._worker.later(_AGAIN_SECONDS, self._announce_again)
 
-    def _wait_for_room(self) -> None:
-        """Wait until something has been fetched, if too much waits."""
+    def _wait_for_room(self, size: int) -> None:
+        """Wait until there is room for a sample, or none is kept."""
         deadline = time.monotonic() + _ROOM_SECONDS
-        while self._bytes > _MOST_BYTES and (left := deadline - time.monotonic()) > 0:
+        while (left := deadline - time.monotonic()) > 0:
             self._progress.clear()
-            if self._bytes > _MOST_BYTES:
-                self._progress.wait(left)
+            self.drop_unneeded()
+            if not self._kept or self._bytes + size <= _MOST_BYTES:
+                return
+            self._progress.wait(left)
 
     def _drop_oldest(self) -> None:
         sequence = next(iter(self._kept))
@@ -284,16 +279,14 @@ class FetchableSamples:
 
     def _announce_again(self) -> None:
         """Repeat the announcements until all samples have been fetched."""
-        if not self.needed:
-            self._announcing = False
-            return
         with self._lock:
             behind = self._behind()
-            self._announcing = bool(behind or self._gone)
+            self._announcing = again = bool(behind or self._gone)
+        self.drop_unneeded()
         with suppress(ClosedError):  # the session may close meanwhile
             for key in behind:
                 self._announce(key)
-        if self._announcing:
+        if again:
             self._worker.later(_AGAIN_SECONDS, self._announce_again)
 
     def _behind(self) -> list[str]:
@@ -325,16 +318,11 @@ class FetchableSamples:
                 payload, attachment = current[1:]
             else:
                 payload, attachment = self._kept.get(sequence, (b"", b""))
-            if request.offset < len(payload):
-                self._current[key] = sequence, payload, attachment
-            elif payload:
+            if payload and request.offset >= len(payload):
                 self._current.pop(key, None)
                 self._done[key] = max(sequence, self._done.get(key, 0))
-                # Only samples that somebody still needs are kept.
-                waiting = (*self._far, *self._gone)
-                done = min((self._done.get(k, self._last) for k in waiting), default=self._last)
-                for number in [n for n in self._kept if n <= done]:
-                    self._bytes -= len(self._kept.pop(number)[0])
+            elif payload and key in self._far:
+                self._current[key] = sequence, payload, attachment
             return payload, attachment
 
     def flush(self) -> dict[str, int]:
@@ -344,15 +332,13 @@ class FetchableSamples:
             The number of samples that were not fetched, by the node of the subscription.
         """
         deadline = time.monotonic() + _CLOSE_SECONDS
-        while self.needed and (left := deadline - time.monotonic()) > 0:
+        while self.drop_unneeded() and (left := deadline - time.monotonic()) > 0:
             self._progress.clear()
             if not self._behind() or not self._progress.wait(min(left, _SILENT_SECONDS)):
                 break
         with self._lock:
-            return {
-                self._far[key].node_name: sum(n > self._done[key] for n in self._kept)
-                for key in self._behind()
-            }
+            nodes = [(self._far[key].node_name, self._done[key]) for key in self._behind()]
+            return Counter(node for node, done in nodes for n in self._kept if n > done)
 
     def close(self) -> None:
         """End its threads; a second call has no effect."""
@@ -361,7 +347,7 @@ class FetchableSamples:
             self._queryable.close()
 
 
-class Fetcher:
+class Fetcher(msgspec.Struct, eq=False):
     """Fetches large samples for one subscription.
 
     Args:
@@ -372,19 +358,12 @@ class Fetcher:
             latest sample that was received.
     """
 
-    def __init__(
-        self,
-        subscription: Entity,
-        depth: int,
-        receive: Callable[[FetchedSample, bytes], object],
-        last: Callable[[bytes], int],
-    ) -> None:
-        self._subscription = subscription
-        self._depth = depth
-        self._receive = receive
-        self._last = last
-        self._cancel = Cancellation()
-        self._sources: dict[tuple[str, int], _FetchSource] = {}
+    _subscription: Entity
+    _depth: int
+    _receive: Callable[[FetchedSample, bytes], object]
+    _last: Callable[[bytes], int]
+    _cancel: Cancellation = msgspec.field(default_factory=Cancellation)
+    _sources: dict[tuple[str, int], _FetchSource] = msgspec.field(default_factory=dict)
 
     def announced(self, sample: Sample) -> None:
         """Fetch the samples that a publisher announces, on a thread for each publisher.

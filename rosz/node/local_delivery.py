@@ -1,10 +1,9 @@
 """Messages between the nodes of one process, which do not pass through the session.
 
-A publisher of a container gives its messages to the subscriptions of its process itself, and the
-session sends them only to others. It gives them the message, or its bytes, from which each
-subscription decodes a message of its own.
-
-Latched messages of the past come from the session here too, as between processes.
+In a container, a publisher passes its messages straight to the subscriptions of its process; the
+session sends them only to other processes. It passes the message itself, or its bytes, from which
+each subscription decodes a message of its own. Latched messages that were published before a
+subscription existed come from the session, as between processes.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ class LocalSample(msgspec.Struct, gc=False):
         gid: 16 bytes that identify the publisher.
         message: The message itself; None if each subscription is to decode its own.
         encoded: Encoded message, or a function that encodes it.
-        attachment: None, as the number and the rest are attributes here.
+        attachment: None: its parts are attributes of this class.
     """
 
     attachment: ClassVar[None] = None
@@ -58,7 +57,7 @@ class LocalReceiver(NamedTuple):
 
     Attributes:
         matches: Function that returns whether it receives the samples of a publisher.
-        receive: Function that takes a sample; it returns soon.
+        receive: Function that takes a sample, and does not wait.
         expect_replay: Function called with the GID of each latching publisher.
     """
 
@@ -71,7 +70,7 @@ class LocalDelivery:
     """The subscriptions of a process, by topic.
 
     Args:
-        by_reference: Whether publishers of rospy pass on messages themselves too.
+        by_reference: Whether publishers of rospy pass on the message itself too, not its bytes.
 
     Attributes:
         by_reference: As given.
@@ -85,18 +84,18 @@ class LocalDelivery:
         self._receivers: dict[str, tuple[LocalReceiver, ...]] = {}
 
     def register(self, topic: str, receiver: LocalReceiver) -> Registration:
-        """Let the publishers of a topic in this process reach a subscription."""
+        """Pass the messages of a topic that this process publishes to a subscription."""
         with self._lock:
             self._receivers[topic] = (*self._receivers.get(topic, ()), receiver)
             self.version += 1
 
         def unregister() -> None:
             with self._lock:
-                left = tuple(
+                others = tuple(
                     other for other in self._receivers.get(topic, ()) if other is not receiver
                 )
-                self._receivers[topic] = left
-                if not left:
+                self._receivers[topic] = others
+                if not others:
                     del self._receivers[topic]
                 self.version += 1
 

@@ -16,7 +16,7 @@ from rosz.node.clock import nanoseconds
 from rosz.node.context import Context
 from rosz.node.core import NodeCore
 from rosz.node.publisher import Publisher
-from rosz.node.ros2.detector import Ros2PeerDetector
+from rosz.node.ros2.detector import Ros2Nodes, Ros2PeerDetector
 from rosz.node.service import Service
 from rosz.node.subscription import GenericSubscription, Subscription
 from rosz.node.timer import Rate, Timer, TimerEvent
@@ -81,6 +81,7 @@ class Node(NodeCore):
         if not self.context.passing:
             standard.follow_clock(self)
             self.keep(Ros2PeerDetector(self))
+            self.params.reach(Ros2Nodes(self))
         standard.open_rosout(self)
 
     @overload

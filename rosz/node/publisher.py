@@ -258,7 +258,7 @@ class Publisher(Entity, Generic[M]):
             self._hold(sequence, payload, attachment)
             fetchable.when_decided(self._release)
         else:
-            needed = fetchable.needed
+            needed = fetchable.drop_unneeded()
             self._state = _State.FETCHED if needed else _State.DIRECT
             published = not needed or self.qos.latched or fetchable.to_publish
             if published:
@@ -372,7 +372,7 @@ class Publisher(Entity, Generic[M]):
         """
         if self._state in {_State.HELD, _State.CLOSED} or self.qos.latched:
             return True
-        far = self._fetchable is not None and self._fetchable.needed
+        far = self._fetchable is not None and self._fetchable.drop_unneeded()
         return far or self._raw.matched
 
     def wait_for_subscribers(self, count: int = 1, timeout: float = 10.0) -> None:

@@ -16,7 +16,7 @@ from rosz.errors import (
     UsageError,
 )
 from rosz.node.core import NodeCore
-from rosz.node.entity import Entity
+from rosz.node.entity import Entity, Introspect
 from rosz.qos import QoS
 from rosz.session import Query
 from rosz.wire import Kind, pack_attachment, read_attachment
@@ -37,7 +37,10 @@ class Service(Entity):
     refuses a request on purpose, and nothing is logged.
 
     A ``number`` is that of the server within the session; by default one that was never used. Calls
-    of a ``rare`` one may wait a moment, and waiting for them costs less.
+    of a ``rare`` server may wait a moment; it has no thread before the first call.
+
+    Attributes:
+        introspect: Function called with each request that is received, and each response sent.
     """
 
     def __init__(
@@ -58,6 +61,7 @@ class Service(Entity):
         self._handler = handler
         self._decode = node.context.decoder(service_type.Request)
         self._rare = rare
+        self.introspect: Introspect | None = None
         self._open(threads)
         self.announce()
 
@@ -65,21 +69,30 @@ class Service(Entity):
         """Receive requests from now on."""
         if not isinstance(threads, int) or threads < 1:
             raise UsageError(f"threads is {threads!r}: expected 1 or more")
-        session = self.node.context.session
-        queryable = self.keep(session.pull_queryable(self.key, complete=True, rare=self._rare))
-        Worker(f"rosz-srv{self.name}", self.serve, receive=queryable.receive, threads=threads)
+        name, session = f"rosz-srv{self.name}", self.node.context.session
+        if self._rare:
+            worker = self.keep(Worker[Query](name, self.serve, threads=threads))
+            self.keep(session.queryable(self.key, worker.submit, complete=True))
+        else:
+            queryable = self.keep(session.pull_queryable(self.key, complete=True))
+            Worker(name, self.serve, receive=queryable.receive, threads=threads)
 
     def serve(self, query: Query) -> None:
         """Respond to a request, and close its query."""
         call = self._read(query)
         if call is None:
             return
+        if self.introspect is not None:
+            self.introspect("REQUEST_RECEIVED", call.caller, call.sequence, call.request)
         try:
             payload = self.respond(call.request, call.caller)
         except ServiceError as error:
             call.refuse(str(error))
         else:
             call.answer(payload)
+            if self.introspect is not None:
+                response = self.service_type.Response._decode(payload)
+                self.introspect("RESPONSE_SENT", call.caller, call.sequence, response)
 
     def _read(self, query: Query) -> Call | None:
         """Return the call of a query; None if that is not one, which the caller learns."""
@@ -129,26 +142,27 @@ class Call:
     Attributes:
         request: The request.
         caller: GID of the client; zeros if the client does not tell.
+        sequence: Number of the request, which the client gave it.
 
     Raises:
         DecodeError: The attachment is damaged.
     """
 
-    __slots__ = ("_query", "_sequence", "_service", "caller", "request")
+    __slots__ = ("_query", "_service", "caller", "request", "sequence")
 
     def __init__(self, service: Service, query: Query, request: Any) -> None:
         self._service = service
         self._query = query
-        self._sequence = 0
+        self.sequence: int = 0
         self.caller: bytes = _NO_GID
         self.request: Any = request
         attachment = query.attachment
         if attachment is not None:
-            self._sequence, _, self.caller = read_attachment(attachment)
+            self.sequence, _, self.caller = read_attachment(attachment)
 
     def answer(self, payload: bytes) -> None:
         """Send the encoded response."""
-        attachment = pack_attachment(self._sequence, time.time_ns(), self.caller)
+        attachment = pack_attachment(self.sequence, time.time_ns(), self.caller)
         with self._query as query:
             try:
                 query.reply(self._service.key, payload, attachment=attachment)

@@ -7,7 +7,6 @@ from typing import Any
 
 from rosz.errors import ClosedError, NotFoundError, UsageError, YamlError
 from rosz.node.core import NodeCore
-from rosz.node.decoder import MessageInfo
 from rosz.node.publisher import Publisher
 from rosz.node.service import Service
 from rosz.node.subscription import Subscription
@@ -16,6 +15,7 @@ from rosz.worker import start_thread
 
 _SECOND = 1_000_000_000
 _THREADS = 16
+_SIM_TIME = "~use_sim_time"
 
 
 def set_initial_params(node: NodeCore) -> None:
@@ -42,27 +42,35 @@ def set_initial_params(node: NodeCore) -> None:
 
 
 def follow_clock(node: NodeCore) -> None:
-    """Simulate time if the parameter ``/use_sim_time`` says so (ROS wiki, Clock).
+    """Simulate time if ``~use_sim_time`` says so or, as in ROS 1, ``/use_sim_time``.
 
     Reading the parameter makes the process a replica of the store, as every node is.
     """
-    if node.params.get("/use_sim_time", False) is True:
-        simulate(node)
+    params = node.params
+    simulate(node, on=params.get(_SIM_TIME, params.get("/use_sim_time", False)) is True)
 
 
-def simulate(node: NodeCore) -> None:
-    """Take the time of a node's context from ``/clock`` from now on."""
+def simulate(node: NodeCore, *, on: bool = True) -> None:
+    """Take the time of a node from ``/clock``, or from the system if not ``on``."""
+    clock = node.clock
+    if not on:
+        if node.time_topic is not None:
+            node.time_topic.close()
+            node.time_topic = None
+            clock.disable_simulation()
+        return
+    if node.time_topic is not None:
+        return
     from rosz.msgs.rosgraph_msgs.msg import Clock
 
-    clock = node.context.clock
     clock.enable_simulation()
 
-    def tick(message: Clock, info: MessageInfo) -> None:
-        now = message.clock.sec * _SECOND + message.clock.nanosec
-        clock.advance(now, publisher=info.gid, number=info.sequence)
+    def tick(message: Clock) -> None:
+        if clock.simulated:
+            clock.advance(message.clock.sec * _SECOND + message.clock.nanosec)
 
     topic = node.resolve("/clock")
-    node.keep(Subscription(node, topic, Clock, tick, CLOCK, with_info=True))
+    node.time_topic = node.keep(Subscription(node, topic, Clock, tick, CLOCK))
 
 
 def open_rosout(node: NodeCore) -> None:

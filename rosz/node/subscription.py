@@ -1,12 +1,10 @@
 """Subscriptions: from Zenoh's samples to a callback, an iterator or `Subscription.get`.
 
-`Subscription._receive` puts a sample into the queue of the subscription. A sample is decoded when
-it is taken from the queue, so a sample that newer ones displace is not decoded.
-
-With a callback, live samples skip that queue: Zenoh's own ring holds them, and a thread takes them
-from there. No Python code runs before a sample is taken, which halves the time from arrival
-to callback. Only replays of latching publishers and directly delivered samples use the queue,
-which a second thread reads; it starts with the first of them. Callbacks run one at a time.
+The session keeps live samples and handles them one at a time (`Session.queue_subscriber`): it
+passes them to the callback, or to the queue from which `Subscription.get` takes them. A sample is
+decoded there, so one that newer ones displace is not decoded. Replays of latching publishers,
+directly delivered samples and those of the same process wait beside them, and a second thread is
+lent to handle them. Callbacks run one at a time.
 """
 
 from __future__ import annotations
@@ -26,11 +24,10 @@ from rosz.node.decoder import AnySample, Received, SampleDecoder, TypeDecoders
 from rosz.node.entity import ANY, Entity
 from rosz.node.fetch import FetchedSample, Fetcher
 from rosz.node.local_delivery import LocalReceiver, LocalSample
-from rosz.program import within
 from rosz.qos import FOREVER, QoS
-from rosz.session import LONGEST_WAIT, PullSubscriber, Reply, Sample, clamp_timeout
+from rosz.session import LONGEST_WAIT, Reply, clamp_timeout
 from rosz.wire import Kind, Token, entity_key, format_token, gid, read_attachment
-from rosz.worker import Worker
+from rosz.worker import Serial
 
 if TYPE_CHECKING:
     from rosz.message import Message
@@ -164,10 +161,10 @@ class Subscription(Entity, Generic[M]):
         self._history = _WantedHistory(history or qos.latched, history_from, time.time_ns())
         self._depth = _ALL if qos.history == "keep_all" else min(qos.depth, _MOST)
         self._queue = _Queue(self._depth)
-        self._queue_worker: Worker[_Item] | None = None
+        self._unhandled: deque[_Item] = deque(maxlen=self._depth)
+        self._serial = Serial(self._handle, keeps_thread=True)
         self._turn = threading.RLock()
         self._until_yield = max(self._depth, _YIELD_AFTER)
-        self._making = threading.RLock()  # a signal handler may come in between
         self._decoders = TypeDecoders(self, self._report_lost, raw=raw, with_info=with_info)
         self._decoder: SampleDecoder | None = None
         self._announced: dict[tuple[str, str], Entity] = {}
@@ -183,28 +180,21 @@ class Subscription(Entity, Generic[M]):
             receiver = LocalReceiver(self.matches, self._receive_message, expect_replay)
             self.keep(local.register(self.name, receiver))
         typed, latched = decoder is not None, self.qos.latched
-        self._subscribe(
-            fit,
-            history=self.qos.depth if typed and latched else 0,
-            recover=typed and latched and self.qos.reliable,
+        self.keep(
+            self.node.context.session.queue_subscriber(
+                self.key,
+                self._depth,
+                self._receive if self._callback is None else self._dispatch,
+                fit=fit,
+                history=self.qos.depth if typed and latched else 0,
+                recover=typed and latched and self.qos.reliable,
+            )
         )
         if self._decoder is not None:
             self._receive_directly(self, self._decoder)
             self.announce()
         if not typed or (self._history.wanted and not latched):
             self.keep(Registration(self.others.listen(self._follow)))
-
-    def _subscribe(self, fit: Callable[[int], int] | None, *, history: int, recover: bool) -> None:
-        session = self.node.context.session
-        if self._callback is None:
-            self.keep(session.subscriber(self.key, self._receive, history=history, recover=recover))
-            return
-        if fit is None:
-            ring = session.pull_subscriber(self.key, self._depth, history=history, recover=recover)
-        else:
-            ring = session.bounded_subscriber(self.key, self._depth, fit)
-        self.keep(ring)
-        Worker(f"rosz-sub{self.name}", self._dispatch, receive=partial(_next_sample, ring))
 
     @property
     def types(self) -> list[str]:
@@ -227,57 +217,42 @@ class Subscription(Entity, Generic[M]):
     # Receiving.
 
     def _receive(self, sample: AnySample, decoder: SampleDecoder | None = None) -> None:
-        """Put a sample into the queue, on a thread of the session; its key may tell no type."""
-        if self._callback is not None:
-            self._queue.put((sample, decoder))
-            make = partial(Worker, handle=self._dispatch_queued, receive=self._queue.receive)
-        elif _is_ahead(sample, decoder, self._history.opened):
-            make = partial(Worker, handle=partial(self._await_live, then=self._queue.put))
+        """Queue a sample, whose key may tell no type; neither blocks nor raises."""
+        if self._callback is not None or _is_ahead(sample, decoder, self._history.opened):
+            self._unhandled.append((sample, decoder))
+            self._serial.wake()
         else:
             self._queue.put((sample, decoder))
-            return
-        worker = self._queue_worker
-        if worker is None:
-            with self._making, within(self.node.program):
-                worker = self._queue_worker = self._queue_worker or make(f"rosz-sub{self.name}")
-        if self._callback is None:
-            with suppress(ClosedError):
-                worker.submit((sample, decoder))
 
     def _receive_message(self, sample: LocalSample) -> None:
-        """Put a message of this process into the queue.
+        """Receive a message of this process.
 
         Python runs one thread at a time, for 5 ms: a publisher that fills the queue within these
         lets the callbacks have their turn, instead of displacing samples that they have not taken.
         """
         self._until_yield -= 1
-        if self._until_yield <= 0 and len(self._queue.items) >= self._depth:
+        if self._until_yield <= 0 and len(self._unhandled or self._queue.items) >= self._depth:
             self._until_yield = max(self._depth, _YIELD_AFTER)
             time.sleep(_YIELD_SECONDS)
-        if self._queue_worker is None:
-            self._receive(sample)
-        else:
-            self._queue.put((sample, None))
+        self._receive(sample)
 
-    def _dispatch_queued(self, item: _Item) -> None:
-        """Dispatch an item, and all that have come until there is none."""
-        items, dispatch = self._queue.items, self._dispatch
-        while True:
+    def _handle(self) -> None:
+        """Pass on the replayed and direct samples, each after the live ones before it."""
+        while self._unhandled:
+            item = self._unhandled.popleft()
             self._await_live(item)
-            dispatch(*item)
-            try:
-                item = items.popleft()
-            except IndexError:
-                return
+            if self._callback is None:
+                self._queue.put(item)
+            else:
+                self._dispatch(*item)
 
-    def _await_live(self, item: _Item, then: Callable[[_Item], object] = lambda _: None) -> None:
+    def _await_live(self, item: _Item) -> None:
         """Wait for the live samples up to a replayed one that was published since the start."""
         deadline = time.monotonic() + _LIVE_SECONDS
         while _is_ahead(*item, self._history.opened):
             if self._queue.closed or time.monotonic() >= deadline:
                 break
             time.sleep(_POLL_SECONDS)
-        then(item)
 
     def _dispatch(self, sample: AnySample, decoder: SampleDecoder | None = None) -> None:
         """Decode a sample, and call the callback with the message."""
@@ -332,10 +307,10 @@ class Subscription(Entity, Generic[M]):
     def _next(self) -> Received | None:
         """Decode the oldest sample, if there is one."""
         with self._turn:  # decoding counts samples, so they must be decoded in their order
-            item = self._queue.pop()
-            if item is None:
+            try:
+                sample, decoder = self._queue.items.popleft()
+            except IndexError:
                 return None
-            sample, decoder = item
             decoder = decoder or self._decoder or self._decoders.of_sample(sample)
             return None if decoder is None else decoder.decode(sample)
 
@@ -466,8 +441,6 @@ class Subscription(Entity, Generic[M]):
 
     def _finish(self) -> None:
         self._queue.close()
-        if self._callback is None and self._queue_worker is not None:
-            self._queue_worker.close()
 
     def _forked(self) -> None:
         self._queue.closed = True
@@ -530,23 +503,6 @@ class _Queue:
         """Wait until an item was added or the queue was closed since the last wait."""
         self._notifier.acquire(timeout=timeout)
 
-    def pop(self) -> _Item | None:
-        """Remove and return the oldest item; ``None`` if there is none."""
-        try:
-            return self.items.popleft()
-        except IndexError:
-            return None
-
-    def receive(self) -> _Item | None:
-        """Wait for an item and return it; ``None`` when the queue is closed."""
-        while not self.closed:
-            item = self.pop()
-            if item is not None:
-                return item
-            self.wait()
-        self.wake()
-        return None
-
     def add_waker(self, waker: Callable[[], None]) -> None:
         """Call a function whenever an item is added, and when the queue is closed."""
         self._wakers = (*self._wakers, waker)
@@ -559,13 +515,6 @@ class _Queue:
         """End all waits; a second call has no effect."""
         self.closed = True
         self.wake()
-
-
-def _next_sample(ring: PullSubscriber) -> Sample | None:
-    try:
-        return ring.receive()
-    except ClosedError:
-        return None
 
 
 def _is_ahead(sample: AnySample, decoder: SampleDecoder | None, opened: int) -> bool:

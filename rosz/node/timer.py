@@ -104,7 +104,7 @@ class Rate:
                 return
 
     def _pause(self, *, reset: bool) -> bool:
-        now = self._clock.steady()
+        now, simulated = self._clock.steady(), self._clock.simulated
         try:
             ended = self._clock.sleep(self._pace.remaining(now))
         except TimeMovedBackwards:
@@ -113,6 +113,8 @@ class Rate:
             self.restart()
             return not self._clock.closed
         self._pace.step(now)
+        if self._clock.simulated is not simulated:
+            self.restart()
         return ended
 
 
@@ -235,11 +237,13 @@ class Timer(Closing):
         last_real: int | None = None
         last_duration: int | None = None
         while True:
-            now = clock.steady()
+            now, simulated = clock.steady(), clock.simulated
             try:
                 if not clock.sleep(pace.remaining(now)):
                     return
                 pace.step(now)
+                if clock.simulated is not simulated:
+                    pace.last, expected = clock.steady(), clock.now()
             except TimeMovedBackwards as error:
                 if not self._reset:
                     self._on_error(f"timer '{self.name}' stopped", error)

@@ -5,7 +5,7 @@ values (`values`), names (`paths`), writes and batches of them (`writes`), the t
 (`tree`) and the set of writes behind it (`history`). They import nothing above the first floor. The
 replicated store is the package `rosz.params.replica`.
 
-`PUBLIC_MODULES` are imported by name, because start-up needs one of them at a time:
+`PUBLIC_MODULES` are imported by name, so that start-up loads only the one that it needs:
 
 - `wire`: keys and messages of the store on the network (pure);
 - `ros2_file`: the nodes that values of a ROS 2 parameter file belong to (pure);
@@ -14,7 +14,7 @@ replicated store is the package `rosz.params.replica`.
 
 from rosz.params.history import History
 from rosz.params.paths import Path, climb, joined, resolve, split
-from rosz.params.tree import MISSING, Difference, Missing, leaves, lookup, preview
+from rosz.params.tree import MISSING, Difference, Draft, Missing, ends, leaves, lookup, preview
 from rosz.params.values import Value, normalise, type_name
 from rosz.params.writes import DELETED, Change, Deleted, Write, condense, spread
 
@@ -30,6 +30,7 @@ __all__ = (
     "Change",
     "Deleted",
     "Difference",
+    "Draft",
     "History",
     "Missing",
     "Path",
@@ -37,6 +38,7 @@ __all__ = (
     "Write",
     "climb",
     "condense",
+    "ends",
     "joined",
     "leaves",
     "lookup",

@@ -35,10 +35,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
 from rosz.params.paths import ROOT, Path
-from rosz.params.tree import MISSING, Draft, Missing, Tree, lookup
+from rosz.params.tree import MISSING, Draft, Missing, Tree, ends, lookup
 from rosz.params.values import Value
 from rosz.params.wire import BUCKETS, pack_digest, read_digest
-from rosz.params.writes import DELETED, Deleted, Order, Write, check_write, put
+from rosz.params.writes import DELETED, Order, Write, check_write, put
 
 try:
     # The module behind hashlib; hashlib itself would load OpenSSL in every node.
@@ -158,9 +158,10 @@ class History:
                 yield node.write
             stack.extend(node.below.values())
 
-    def bucket(self, index: int) -> Iterator[Write]:
-        """Yield the writes in one bucket of the digest."""
-        return (write for write in self.writes() if _bucket_of("/".join(write.path)) == index)
+    def in_buckets(self, indices: Iterable[int]) -> Iterator[Write]:
+        """Yield the writes in some buckets of the digest."""
+        wanted = frozenset(indices)
+        return (write for write in self.writes() if _bucket_of("/".join(write.path)) in wanted)
 
     def digest(self) -> bytes:
         """Return the digest of the set, in the form that replicas exchange."""
@@ -188,7 +189,7 @@ class History:
         lacking: list[Write] = []
         wanted: list[Path] = []
         ahead = behind = False
-        for write in (write for bucket in buckets for write in self.bucket(bucket)):
+        for write in self.in_buckets(buckets):
             theirs = index.get(write.path)
             if theirs is not None and theirs >= (write.time, write.clock):
                 continue
@@ -278,7 +279,7 @@ class History:
         may have been deleted by themselves. If some are not proven, only the replacement of
         older writes is proven: that is a deletion, right after the dict.
         """
-        if all(self._holds_older(path, write.order) for path in _ends(write.value, write.path)):
+        if all(self._holds_older(path, write.order) for path, _ in ends(write.value, write.path)):
             return write
         if not self._holds_older(write.path, write.order):
             return None
@@ -408,15 +409,6 @@ class History:
             if way[depth].write is not None or way[depth].below:
                 break
             del way[depth - 1].below[path[depth - 1]]
-
-
-def _ends(value: Value | Deleted, path: Path) -> Iterator[Path]:
-    """Yield the path of every leaf and every empty dict in a value; a deletion is one, too."""
-    if type(value) is not dict or not value:
-        yield path
-        return
-    for key, item in value.items():
-        yield from _ends(item, (*path, key))
 
 
 def _standing(

@@ -44,14 +44,14 @@ def assign(value: Any, namespace: str) -> list[tuple[str, Any]]:
                 f"this parameter file of ROS 2 has nothing for the node '{node}', only for {names}"
             )
         matching.sort(key=lambda section: "*" not in section[0])
-        return [(node, _nest(values)) for _, values in matching]
+        return [(node, nest(values)) for _, values in matching]
     for name, _ in parts:
         if "*" in name:
             raise ParamError(
                 f"'{name}' in this parameter file of ROS 2 means any node that reads it; load it "
                 "into a node: give the node's name as namespace, or write <rosparam> inside <node>"
             )
-    return [(name, _nest(values)) for name, values in parts]
+    return [(name, nest(values)) for name, values in parts]
 
 
 def sections(tree: Any, name: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
@@ -97,7 +97,7 @@ def _flatten(tree: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield f"{prefix}{key}", value
 
 
-def _nest(values: dict[str, Any]) -> dict[str, Any]:
+def nest(values: dict[str, Any]) -> dict[str, Any]:
     """Return values by name (``gains.p``) as nested dictionaries."""
     tree: dict[str, Any] = {}
     for name, value in values.items():

@@ -1,8 +1,7 @@
 """The tree of parameters, by ROS 1's rules, as dicts that do not change once they are visible.
 
-A root that was handed out is never written to: a `Draft` copies each dict on the way down the first
-time that it changes it. So readers need no lock, and a batch becomes visible as one change, when
-its root does.
+A root that readers see is never changed: a `Draft` copies each dict on the path before it changes
+that for the first time. So readers need no lock, and all changes of a batch become visible at once.
 """
 
 from __future__ import annotations
@@ -42,18 +41,23 @@ def lookup(root: Value, path: Path) -> Value | Missing:
     try:
         for part in path:
             node = node[part]
-    except (KeyError, TypeError):  # a leaf on the way cannot be indexed by text
+    except (KeyError, TypeError):  # a value on the path is not a dict
         return MISSING
     return node
 
 
 def leaves(value: Value, path: Path = ()) -> Iterator[tuple[Path, Value]]:
-    """Yield the path and value of everything below a value that is not a dict."""
-    if type(value) is not dict:
+    """Return the path and value of everything below a value that is not a dict."""
+    return (end for end in ends(value, path) if type(end[1]) is not dict)
+
+
+def ends(value: Value | Deleted, path: Path = ()) -> Iterator[tuple[Path, Value | Deleted]]:
+    """Yield the path and value of everything below a value that is not a dict with items."""
+    if type(value) is not dict or not value:
         yield path, value
         return
     for key, item in value.items():
-        yield from leaves(item, (*path, key))
+        yield from ends(item, (*path, key))
 
 
 class Draft:
@@ -68,10 +72,10 @@ class Draft:
 
     def __init__(self, root: Tree) -> None:
         self.root: Value = root
-        self._own: dict[int, Tree] = {}
+        self._copies: dict[int, Tree] = {}
 
     def change(self, path: Path, value: Value | Deleted) -> None:
-        """Set a value or delete a path; all above become dicts, and stay even if empty."""
+        """Set a value or delete a path; everything above becomes a dict, which stays if empty."""
         if value is DELETED:
             self._parent(path).pop(path[-1], None)
         elif path:
@@ -89,10 +93,10 @@ class Draft:
         return node
 
     def _writable(self, node: Tree) -> Tree:
-        return node if id(node) in self._own else self._new(node.copy())
+        return node if id(node) in self._copies else self._new(node.copy())
 
     def _new(self, node: Tree) -> Tree:
-        self._own[id(node)] = node
+        self._copies[id(node)] = node
         return node
 
 

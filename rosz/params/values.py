@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from rosz.errors import ParamError
+from rosz.names import LONGEST_PATH
 
 Value = Any
 """The value of a parameter: one of the types above, nested at most `MAX_DEPTH` deep."""
@@ -76,7 +77,7 @@ def normalise(value: object, name: str = "") -> Value:
         ParamError: A parameter cannot hold the value, or a part of it; the message names the place.
     """
     try:
-        return _normalise(value, 0)
+        return _normalise(value, 0, LONGEST_PATH - len(name.encode(errors="replace")))
     except _RefusedError as refused:
         start = f"'{name}' cannot be set: " if name else ""
         inside = f"at {''.join(reversed(refused.trail))}: " if refused.trail else ""
@@ -126,7 +127,7 @@ def _short(value: Value) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."  # noqa: PLR2004  # a line on the screen
 
 
-def _normalise(value: Any, depth: int) -> Value:
+def _normalise(value: Any, depth: int, room: int) -> Value:
     kind = type(value)
     if kind is str:
         return _text(value)
@@ -137,10 +138,10 @@ def _normalise(value: Any, depth: int) -> Value:
     if depth >= MAX_DEPTH:
         raise _RefusedError(f"it is nested more than {MAX_DEPTH} deep, or contains itself")
     if isinstance(value, dict):
-        return _mapping(value, depth)
+        return _mapping(value, depth, room)
     if isinstance(value, (list, tuple)):
-        return _sequence(value, depth)
-    return _unusual(value, depth)
+        return _sequence(value, depth, room)
+    return _unusual(value, depth, room)
 
 
 def _text(value: str) -> str:
@@ -158,31 +159,35 @@ def _integer(value: int) -> int:
     )
 
 
-def _mapping(value: dict[Any, Any], depth: int) -> dict[str, Value]:
+def _mapping(value: dict[Any, Any], depth: int, room: int) -> dict[str, Value]:
     items: dict[str, Value] = {}
     for key, item in value.items():
         if not isinstance(key, str):
             raise _RefusedError(f"the key {key!r} is a {type_name(key)}; expected a str")
+        text = str.__str__(key)
         try:
-            items[_text(str.__str__(key))] = _normalise(item, depth + 1)
+            left = room - len(_text(text).encode()) - 1
+            if left < 0:
+                raise _RefusedError(f"its name would have more than {LONGEST_PATH} bytes")  # noqa: TRY301
+            items[text] = _normalise(item, depth + 1, left)
         except _RefusedError as refused:
-            refused.trail.append(f"/{key}")
+            refused.trail.append(f"/{text:.60}")
             raise
     return items
 
 
-def _sequence(value: list[Any] | tuple[Any, ...], depth: int) -> list[Value]:
+def _sequence(value: list[Any] | tuple[Any, ...], depth: int, room: int) -> list[Value]:
     items: list[Value] = []
     for index, item in enumerate(value):
         try:
-            items.append(_normalise(item, depth + 1))
+            items.append(_normalise(item, depth + 1, room))
         except _RefusedError as refused:
             refused.trail.append(f"[{index}]")
             raise
     return items
 
 
-def _unusual(value: Any, depth: int) -> Value:
+def _unusual(value: Any, depth: int, room: int) -> Value:
     """Convert an object that is not one of the store's types but becomes one without loss."""
     if value is None:
         raise _RefusedError(
@@ -193,7 +198,7 @@ def _unusual(value: Any, depth: int) -> Value:
             return convert_from(value)
     to_list = getattr(value, "tolist", None)
     if callable(to_list):
-        return _normalise(to_list(), depth + 1)
+        return _normalise(to_list(), depth + 1, room)
     raise _RefusedError(f"a {type(value).__name__} is not a parameter value; {_EXPECTED}")
 
 

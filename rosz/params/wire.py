@@ -5,9 +5,11 @@ The protocol between replicas, and between a replica and its clients:
 - **Write.** The writer applies a batch itself, then publishes it on ``change``, behind a header
   with its session and a number. Every replica that has applied it (and stored it, if it has
   storage) publishes an **acknowledgement**, that number and its own session, on ``ack`` of the
-  writer. A replica that does not acknowledge in time is sent the batch once more as a query on its
-  ``write`` key (the barrier query), whose reply is the acknowledgement. A replica that refuses the
-  batch, or cannot store it, adds the reason, which the writer raises.
+  writer. While a replica is at work on a large batch, it publishes the same with ``+`` before the
+  session, which replicas that do not know of it ignore. A replica that does not acknowledge in time
+  is sent the batch once more as a query on its ``write`` key (the barrier query), whose reply is
+  the acknowledgement. A replica that refuses the batch, or cannot store it, adds the reason, which
+  the writer raises.
   A replica that leaves publishes a batch with number 0 (`Departure`).
 - **Exchange of differences.** A replica sends another its **digest** on the ``sync`` key of the
   other. If the digests differ, it sends the index (path and stamp) of its writes in the buckets
@@ -55,6 +57,7 @@ from typing import Any, ClassVar, Final, Literal, TypeVar
 import msgspec
 
 from rosz.errors import DecodeError, ParamError
+from rosz.names import LONGEST_PATH
 from rosz.params.paths import Path, common_path, from_key, joined, to_key
 from rosz.params.values import Value, normalise
 from rosz.params.writes import DELETED, Change, Write, put
@@ -403,6 +406,8 @@ class ClientRequest(msgspec.Struct, omit_defaults=True):
         batch: Batch to write. Its stamp is the client's own, so that it does no harm if two
             replicas make the write, or one of them makes it much later.
         timeout: Time in seconds that a write waits for the other replicas.
+        beats: Whether the time limit of a write counts from the last progress, and the replica
+            replies ``working`` ten times a second until the end.
     """
 
     verb: str
@@ -410,18 +415,19 @@ class ClientRequest(msgspec.Struct, omit_defaults=True):
     node: str = "/"
     batch: Batch | None = None
     timeout: float = 0.0
+    beats: bool = False
 
 
 class ClientReply(msgspec.Struct, omit_defaults=True):
     """The reply to a `ClientRequest`.
 
     Attributes:
-        status: ``ok``, ``missing`` (no such parameter), ``joining`` (ask another replica) or
-            ``refused``.
+        status: ``ok``, ``missing`` (no such parameter), ``joining`` (ask another replica),
+            ``refused``, or ``working`` if another reply follows.
         value: Result; if the parameter is missing, the names in its namespace.
         text: Reason if it is refused.
         origin: Writer of the value, as shown to users.
-        slow: Replicas that did not acknowledge a write in time.
+        slow: Replicas that did not acknowledge a write in time, or have not done so yet.
         holders: Number of replicas, beside the one that replies, that acknowledged a write.
         reasons: If a write stands, but not everywhere: the replicas that do not keep it, and why.
         what: The parameters of such a write, as shown to users.
@@ -519,8 +525,12 @@ def split_path(text: str) -> Path:
     """Return the path that `join_path` wrote.
 
     Raises:
-        DecodeError: The path has an empty part.
+        DecodeError: The path has an empty part, or is too long.
     """
+    if len(text.encode()) >= LONGEST_PATH:
+        raise DecodeError(
+            "parameter path", -1, f"'{text[:60]}…' has more than {LONGEST_PATH} bytes"
+        )
     path = tuple(text.split("/")) if text else ()
     if "" in path:
         raise DecodeError("parameter path", -1, f"'{text}', expected '{joined(path)[1:]}'")
@@ -547,8 +557,9 @@ def _read_write(path: str, stamp: tuple[int, str], value: Any, origin: str) -> W
             "parameter stamp", -1, f"the time {stamp[0]}, expected one after the epoch"
         )
     try:
-        checked = value if value is DELETED else normalise(value)
-        return put(split_path(path), stamp, checked, origin)
+        place = split_path(path)
+        checked = value if value is DELETED else normalise(value, joined(place))
+        return put(place, stamp, checked, origin)
     except ParamError as error:
         raise DecodeError("parameter write", -1, str(error)) from error
 

@@ -34,6 +34,7 @@ _LEADING_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _WRONG_WORDS = 255  # ROS 1's programs return -1
 _MILLISECONDS = 1000
 _EULER, _QUATERNION = 6, 7
+_MOST_DIGITS = 99
 _FIRST_TIMEOUT = _NANOSECONDS
 _LISTEN_SECONDS = 5.0  # as in ROS 1
 _MONITOR_SECONDS = 0.2
@@ -113,6 +114,9 @@ def parse_transform(words: Sequence[str], read: Callable[[str], float] = float) 
 def static_transform_publisher() -> None:
     """Publish a transform on ``/tf`` again and again, as the program of tf does."""
     words = list(parse(sys.argv[1:]).rest)
+    if len(words) not in {_EULER + 3, _QUATERNION + 3}:
+        wrong = f"got {len(words)} arguments, expected {_EULER + 3} or {_QUATERNION + 3}"
+        _refuse(f"static_transform_publisher: {wrong}\n{_TF_USAGE}")
     try:
         transform = parse_transform(words[:-1], leading_number)
         period = _positive("the period in ms", words[-1]) / _MILLISECONDS
@@ -181,12 +185,14 @@ def tf_echo() -> None:
             rate = _positive("the rate", *rest or [str(node.params.get("~rate", 1.0))])
         except UsageError as error:
             _refuse(f"tf_echo: {error}\n{_ECHO_USAGE}")
-        precision = int(node.params.get("~precision", 3))
+        digits = node.params.get("~precision", 3)
+        if not (isinstance(digits, int | float) and 0 <= digits <= _MOST_DIGITS):
+            _refuse(f"tf_echo: ~precision is {digits!r}; expected from 0 to {_MOST_DIGITS}")
         buffer = Buffer()
         TransformListener(buffer, node)
         buffer.wait(lambda: not buffer.why_not(source, target), _FIRST_TIMEOUT, node.clock)
         for _ in node.rate(rate):
-            _print(_echoed(buffer, source, target, node, precision))
+            _print(_echoed(buffer, source, target, node, int(digits)))
 
 
 def _print(text: str) -> None:
@@ -266,12 +272,14 @@ def view_frames() -> None:
     if not frames:
         sys.exit("view_frames: no transforms have come")
     source = Path("frames.gv")
-    source.write_text(tree_as_dot(frames, _LISTEN_SECONDS), encoding="utf-8")
-    made = [str(source)]
     dot = shutil.which("dot")
-    for kind in ("pdf", "svg") if dot else ():
-        subprocess.run([str(dot), f"-T{kind}", str(source), "-o", f"frames.{kind}"], check=True)
-        made.append(f"frames.{kind}")
-    sys.stdout.write(f"{', '.join(made)} generated\n")
+    try:
+        source.write_text(tree_as_dot(frames, _LISTEN_SECONDS), encoding="utf-8")
+        if dot:
+            outputs = ("-Tpdf", "-oframes.pdf", "-Tsvg", "-oframes.svg")
+            subprocess.run([dot, *outputs, str(source)], check=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        sys.exit(f"view_frames: cannot draw '{source}': {error}")
+    sys.stdout.write(f"{source}{', frames.pdf, frames.svg' if dot else ''} generated\n")
     if not dot:
         sys.exit("view_frames: without Graphviz there is no picture: apt install graphviz")

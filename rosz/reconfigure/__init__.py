@@ -7,14 +7,7 @@ The public module `messages` translates settings to messages and dictionaries.
 """
 
 from rosz.reconfigure.client import Client, find_servers
-from rosz.reconfigure.description import (
-    Choice,
-    Config,
-    Description,
-    Group,
-    Setting,
-    enumeration,
-)
+from rosz.reconfigure.description import Choice, Config, Description, Group, Setting, enumeration
 from rosz.reconfigure.files import dump, load
 from rosz.reconfigure.server import ALL_LEVELS, Server
 

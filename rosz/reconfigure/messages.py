@@ -1,9 +1,9 @@
 """Settings as the messages of dynamic_reconfigure, and back.
 
 The ``pack_`` and ``unpack_`` functions translate a `Description` and values. The ``encode_`` and
-``decode_`` functions translate trees of dictionaries, the form in which generated modules and the
-clients of dynamic_reconfigure have them: a group is a dictionary with ``name``, ``type``,
-``state``, ``id``, ``parent``, ``parameters`` and ``groups``.
+``decode_`` functions translate trees of dictionaries, which generated modules and the clients of
+dynamic_reconfigure use: a group is a dictionary with ``name``, ``type``, ``state``, ``id``,
+``parent``, ``parameters`` and ``groups``.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _SETTING_FIELDS: Final = ("name", "default", "description", "level", "min", "max
 
 
 def pack_values(values: Mapping[str, Any]) -> ConfigMessage:
-    """Return the message of values, each with its own type."""
+    """Return the message of values, each in the list of its type."""
     message = ConfigMessage()
     for name, value in values.items():
         match kind_of(value):
@@ -152,7 +152,7 @@ def _groups_of(group: Any) -> Iterator[Any]:
 
 
 def _inner_groups(group: Mapping[str, Any]) -> list[Any]:
-    """Return the groups in a group, which has them as a list if generated, by name if decoded."""
+    """Return the groups in a group: a list in a generated group, a dict in a decoded one."""
     groups = group["groups"]
     return list(groups.values()) if isinstance(groups, Mapping) else list(groups)
 
@@ -189,7 +189,7 @@ def encode_config(config: Mapping[str, Any], flat: bool = True) -> ConfigMessage
 
     Args:
         config: Values by name, and groups under ``groups``.
-        flat: Whether the groups are a tree; otherwise they are a list.
+        flat: Whether the groups are a tree, which is flattened; otherwise they are a list.
     """
     message = pack_values(
         {name: value for name, value in config.items() if isinstance(value, Scalar)}
@@ -213,7 +213,7 @@ def _state(group: Mapping[str, Any]) -> GroupState:
 
 
 def group_dict(group: Any) -> Config:
-    """Return a group of a message as a dictionary without groups and parameters."""
+    """Return a group of a message as a dictionary, with no groups and parameters yet."""
     return Config(
         id=group.id,
         parent=group.parent,

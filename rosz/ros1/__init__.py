@@ -8,8 +8,6 @@ exceptions, and the table of modules for ``importer``. ``script`` and ``python2`
 is imported on its own, since start-up needs few of them.
 """
 
-from __future__ import annotations
-
 from rosz.ros1.importer import install
 
 PUBLIC_MODULES = (

@@ -38,15 +38,7 @@ from rosz.interrupts import InterruptDeferral
 from rosz.message import Message, Ros2Default, Service
 from rosz.packages import PackageIndex
 from rosz.replacements import instead_of
-from rosz.ros1.modules import (
-    MODULES,
-    Module,
-    add_submodules,
-    attribute,
-    explain_missing,
-    list_exports,
-    submodule,
-)
+from rosz.ros1 import modules
 from rosz.typestore import Kind, TypeStore, is_generated, shipped_packages, shipped_types
 
 if TYPE_CHECKING:
@@ -195,7 +187,7 @@ class _AliasLoader(Loader):
     def exec_module(self, module: ModuleType) -> None:
         """Add submodules; the module has been executed under its own name."""
         module.__spec__ = self._spec or module.__spec__
-        add_submodules(self._name)
+        modules.add_submodules(self._name)
 
 
 def _alias(name: str, load: Callable[[], ModuleType]) -> ModuleSpec:
@@ -207,14 +199,14 @@ def _loaded(name: str, load: Callable[[], ModuleType]) -> ModuleType:
     try:
         module = load()
     except ModuleNotFoundError as error:
-        module_of = MODULES.get(name.partition(".")[0], Module())
+        module_of = modules.MODULES.get(name.partition(".")[0], modules.Module())
         extra = module_of.extras.get(error.name or "")
         if extra is None:
             raise
         text = f"{error}; {name} needs it, run: pip install 'rosz[{extra}]'"
         raise ModuleNotFoundError(text, name=error.name) from error
-    list_exports(module)
-    explain_missing(name, module)
+    modules.list_exports(module)
+    modules.explain_missing(name, module)
     return module
 
 
@@ -234,7 +226,7 @@ class _FrontFinder(MetaPathFinder):
         if root == "rosz":
             # ``from sensor_msgs import point_cloud2`` looks below the module's own name.
             alias = fullname.removeprefix("rosz.msgs.")
-            if "." in alias and MODULES.get(alias, Module()).home:
+            if "." in alias and modules.MODULES.get(alias, modules.Module()).home:
                 return self._of_rosz(alias, alias)
             return self._compiled(fullname)
         spec = self._of_ros(fullname, root, rest, path)
@@ -246,14 +238,14 @@ class _FrontFinder(MetaPathFinder):
         self, fullname: str, root: str, rest: str, path: Sequence[str] | None
     ) -> ModuleSpec | None:
         first, _, inner = rest.partition(".")
-        kind = _KINDS.get(first) if fullname not in MODULES else None
+        kind = _KINDS.get(first) if fullname not in modules.MODULES else None
         if kind == "action" and not self.types.store.has(root, kind):
             kind = None  # such as rclpy.action
         if kind is not None:
             return self._of_package(fullname, root, kind, inner, path)
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
-        if root in MODULES or fullname in MODULES:
+        if root in modules.MODULES or fullname in modules.MODULES:
             return self._of_rosz(fullname, root)
         if root in self._shipped and not rest:
             return _alias(fullname, lambda: self._of_messages(root))
@@ -268,15 +260,15 @@ class _FrontFinder(MetaPathFinder):
         homes = {
             kind: f"{package}.{kind}" for kind in _KINDS if shipped_types(package, _KINDS[kind])
         }
-        vars(module).setdefault("__getattr__", attribute(package, module, homes))
+        vars(module).setdefault("__getattr__", modules.attribute(package, module, homes))
         return module
 
     def _of_rosz(self, name: str, root: str) -> ModuleSpec | None:
         """Find ``rospy`` or one of its submodules; importing it may need an extra."""
-        module = MODULES.get(name)
+        module = modules.MODULES.get(name)
         if module is not None and not module.home:
-            return _alias(name, lambda: _loaded(name, lambda: submodule(name)))
-        below = module.home if module else MODULES[root].home + name.removeprefix(root)
+            return _alias(name, lambda: _loaded(name, lambda: modules.submodule(name)))
+        below = module.home if module else modules.MODULES[root].home + name.removeprefix(root)
         own = f"rosz.{below}"
         try:
             exists = own in sys.modules or find_spec(own) is not None

@@ -143,7 +143,9 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         "rclpy.executors": "CallbackGroup MutuallyExclusiveCallbackGroup ReentrantCallbackGroup",
     },
     "rclpy.client": {"rclpy.entities": "Client"},
-    "rclpy.clock": {"rclpy.time": "Clock ClockType ROSClock"},
+    "rclpy.clock": {
+        "rclpy.time": "Clock ClockChange ClockType JumpHandle JumpThreshold ROSClock TimeJump"
+    },
     "rclpy.context": {"rclpy.context": "Context"},
     "rclpy.duration": {"rclpy.time": "Duration Infinite"},
     "rclpy.event_handler": {
@@ -175,6 +177,7 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
     },
     "rclpy.serialization": {"rclpy.program": "deserialize_message serialize_message"},
     "rclpy.service": {"rclpy.entities": "Service"},
+    "rclpy.service_introspection": {"rclpy.entities": "ServiceIntrospectionState"},
     "rclpy.signals": {"rclpy.program": "SignalHandlerOptions"},
     "rclpy.subscription": {"rclpy.entities": "Subscription"},
     "rclpy.task": {"rclpy.executors": "Future Task"},

@@ -12,14 +12,6 @@ from rosz.environment import Environment, package_index
 from rosz.errors import PackageNotFound
 from rosz.packages import PackageIndex
 
-__all__ = (
-    "PackageNotFoundError",
-    "get_package_prefix",
-    "get_package_share_directory",
-    "get_package_share_path",
-    "get_packages_with_prefixes",
-)
-
 
 class PackageNotFoundError(KeyError):
     """A package is not on the package path."""

@@ -25,15 +25,4 @@ if TYPE_CHECKING:
     from rosz.security.rules import EVERYTHING, Permit, Rules, read_rules
     from rosz.security.zenoh_rules import access_control
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "authority": "Authority",
-            "folder": "CERTIFICATE KeyFolder KeyWatch LocalPermissions read_trusted",
-            "handshake": "certificate_names refusal wants_keys",
-            "patterns": "PatternReader compose is_pattern matches",
-            "review": "review_keys",
-            "rules": "EVERYTHING Permit Rules read_rules",
-            "zenoh_rules": "access_control",
-        },
-    )
+    __getattr__ = exports_of(__name__)

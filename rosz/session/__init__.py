@@ -35,11 +35,4 @@ if TYPE_CHECKING:
     from rosz.session.router import ExternalRouter, Router, zenoh_configuration
     from rosz.session.stale_links import SplitWatch, SuspensionDetector
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "restart": "restart_program take_handover",
-            "router": "ExternalRouter Router zenoh_configuration",
-            "stale_links": "SplitWatch SuspensionDetector",
-        },
-    )
+    __getattr__ = exports_of(__name__)

@@ -27,12 +27,7 @@ from rosz.errors import ClosedError
 from rosz.worker import ENDING
 
 OPEN: set[object] = set()
-"""Queues to which threads that Zenoh started add items; a thread removes its queue when it ends."""
-
-_ZENOH_THREAD = "(pyo3-closure)"
-"""The end of the names of threads that Zenoh's binding starts for callbacks, as in its 1.7 to 1.10.
-Those of rosz are daemons. One whose queue is removed, or whose declaration was refused, may still
-be inside Zenoh for a moment."""
+"""Queues to which threads of Zenoh add items; the last of them removes the queue."""
 
 _leaked: list[object] = []
 _lost = threading.Lock()
@@ -53,8 +48,7 @@ def leak_at_exit(thing: object) -> None:
 def wait_for_calls(timeout: float) -> bool:
     """Set `ENDING`, and wait until nothing is `OPEN`, and no other thread inside this package.
 
-    A thread with a function of it anywhere on its stack may be inside Zenoh, or return to it. The
-    threads that Zenoh started for rosz have to end, since no stack shows that one is inside Zenoh.
+    A thread with a function of it anywhere on its stack may be inside Zenoh, or return to it.
 
     Args:
         timeout: Time limit in seconds.
@@ -73,11 +67,6 @@ def wait_for_calls(timeout: float) -> bool:
         if time.monotonic() > deadline:
             return False
         time.sleep(_POLL_SECONDS)
-    for zenoh_thread in threading.enumerate():
-        if zenoh_thread.daemon and zenoh_thread.name.endswith(_ZENOH_THREAD):
-            zenoh_thread.join(max(0.0, deadline - time.monotonic()))
-            if zenoh_thread.is_alive():
-                return False
     return True
 
 

@@ -4,25 +4,33 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any
 
 import msgspec
 import zenoh
 
-from rosz.errors import ClosedError, PanicError, TransportError
+from rosz.errors import ClosedError, PanicError, RoszError, TransportError
 from rosz.names import LONGEST_KEY, check_length
 from rosz.session.at_exit import leak_at_exit, lose_sessions
-from rosz.session.channels import CallbackQueue, ItemChannel
+from rosz.session.channels import CallbackQueue, declare_callback
 from rosz.session.samples import Sample
-from rosz.worker import ENDING, Worker
+from rosz.worker import ENDING, Serial, Worker, handle_all
 
 _PANIC = "PanicException"
 """The class of PyO3 for panics. It is not an `Exception`, and no module has it."""
 _POISONED = "PoisonError"
 """Name of the error by which Rust reports a lock that was held during a panic."""
+
+_OFTEN_SECONDS = 1.0
+_MANY = 5
+"""Samples within that time that make a subscriber busy."""
+_IDLE_SECONDS = 2.0
+"""Seconds between two checks whether a busy subscriber is idle; after two idle ones it is free."""
 
 _log = logging.getLogger("rosz.session")
 
@@ -108,7 +116,7 @@ class Declared:
                 self._undeclare()
 
     def _undeclare(self) -> None:
-        """Undeclare it unless a call is going on, or another thread has begun to."""
+        """Undeclare it, unless a call is running or another thread already does."""
         ending = ENDING.is_set()
         if self._calls and not ending:
             return
@@ -122,7 +130,6 @@ class Declared:
             # The session may close at this very moment, and undeclares everything.
             with suppress(ClosedError), translate_errors(f"undeclare {self._what}"):
                 entity.undeclare()
-        del entity
 
     def __del__(self) -> None:
         """Undeclare a declaration that nobody closed."""
@@ -143,17 +150,17 @@ class Callbacks(Declared):
     def __init__(
         self,
         what: str,
-        declared: tuple[Any, ItemChannel | CallbackQueue],
+        declared: tuple[Any, Any],
         callback: Callable[[Any], None],
         begin: Callable[[], None] | None = None,
         idle: Callable[[], None] | None = None,
     ) -> None:
         entity, source = declared
         super().__init__(what, entity)
-        # The delivery must not refer to this object, else it would not be undeclared.
+        # The delivery must not hold this object: `__del__` would never run.
         if isinstance(source, CallbackQueue):
             delivery = _Delivery(what, source.take, callback, begin, idle)
-            source.handle_with(delivery.deliver_all, at_once=bool(begin or idle))
+            source.handle_with(Serial(delivery.deliver_all), at_once=bool(begin or idle))
             return
         delivery = _Delivery(what, source.try_recv, callback, begin, idle)
         recv = source.recv
@@ -208,8 +215,7 @@ class PullSubscriber(Declared):
     """A subscriber that keeps the newest samples until a thread receives them."""
 
     def __init__(self, key: str, entity: Any) -> None:
-        super().__init__(f"subscriber '{key}'", entity)
-        self._key = key
+        super().__init__(f"subscriber of '{key}'", entity)
         self._recv = entity.handler.recv
         self._try_recv = entity.handler.try_recv
 
@@ -220,11 +226,11 @@ class PullSubscriber(Declared):
             ClosedError: The subscriber or the session was closed.
         """
         if ENDING.is_set():
-            raise ClosedError(f"the subscriber of '{self._key}' is closed")
+            raise ClosedError(f"the {self._what} is closed")
         try:
             return Sample(self._recv())
         except zenoh.ZError as error:
-            raise ClosedError(f"the subscriber of '{self._key}' is closed") from error
+            raise ClosedError(f"the {self._what} is closed") from error
 
     def take(self) -> list[Sample]:
         """Return the samples that wait, oldest first; none when it is closed."""
@@ -235,61 +241,167 @@ class PullSubscriber(Declared):
         return samples
 
 
-class BoundedSubscriber(PullSubscriber):
-    """A subscriber whose number of samples that wait falls with their size.
+class QueueSubscriber:
+    """A subscriber that keeps the newest samples, and has them handled in order, one at a time.
 
-    The channels of Zenoh have a fixed number of places. Where that has to fall, a subscriber with
-    a smaller channel takes the place of the one before. The samples of the latter are
-    received first, and those that both have are received once.
+    While few samples come, the threads of Zenoh put them into a queue, and a thread is lent to
+    handle them. When many come, Zenoh's link threads would often wait for the GIL there. So a busy
+    subscriber keeps its thread, and receives from a channel of Zenoh until no more come. Such a
+    channel has a fixed capacity: a smaller one replaces it when fewer samples may wait. At each
+    change a second subscriber is declared before the first is undeclared. The samples of the first
+    are handled first, and a sample that both have is handled once.
 
-    Args:
-        key: The key expression.
-        declare: Function that declares a subscriber that keeps so many samples.
-        depth: The number of samples to keep at first.
-        fit: Function that returns how many samples of a size in bytes may wait.
+    Arguments are those of `Session.queue_subscriber`, and a function that declares a subscriber
+    with a handler. One with a history is never busy: each declaration would replay the history.
     """
 
     def __init__(
-        self, key: str, declare: Callable[[int], Any], depth: int, fit: Callable[[int], int]
+        self,
+        key: str,
+        declare: Callable[[Any], Any],
+        depth: int,
+        handle: Callable[[Sample], object],
+        *,
+        fit: Callable[[int], int] | None,
+        history: bool,
     ) -> None:
-        super().__init__(key, declare(depth))
+        self._key = key
         self._declare = declare
         self._depth = depth
         self._fit = fit
+        self._closed = False
+        self._channel: PullSubscriber | None = None
+        self._next_queue: tuple[Declared, CallbackQueue] | None = None
+        self._idle = self._is_leaving = False
         self._waiting: deque[Sample] = deque()
         self._repeated: set[bytes | None] = set()
-        self._doubtful = 0  # how many samples may still be repeated ones
+        self._unchecked = 0  # how many of the next samples may be repeated ones
+        self._may_be_busy = not history
+        self._counted_at = 0.0
+        self._count = self._count_at_sweep = 0
+        self._queue_declaration, self._queue = self._declare_queue()
+        self._serial = Serial(partial(handle_all, self._receive, handle), keeps_thread=True)
+        self._queue.handle_with(self._serial)
 
-    def receive(self) -> Sample:
-        """Wait for a sample and return the oldest one."""
-        while True:
-            if self._waiting:
-                return self._waiting.popleft()
-            sample = super().receive()
-            if self._doubtful:
-                self._doubtful -= 1
+    def _declare_queue(self) -> tuple[Declared, CallbackQueue]:
+        entity, queue = declare_callback(self._declare, self._depth)
+        return Declared(f"subscriber '{self._key}'", entity), queue
+
+    def _receive(self) -> Sample | None:
+        """Return the oldest sample; if there is none, wait for one if busy, else return None."""
+        while not self._waiting:
+            if self._channel is None:
+                if (raw := self._queue.take()) is None:
+                    return None
+                sample = Sample(raw)
+                self._count_arrival()
+            else:
+                self._idle = True
+                try:
+                    sample = self._channel.receive()
+                except ClosedError:
+                    self._return_to_queue()
+                    continue
+                self._idle = False
+                self._count += 1
+            if self._unchecked:
+                self._unchecked -= 1
                 if sample.attachment in self._repeated:
                     continue
-            depth = self._fit(sample.size)
-            if depth < self._depth:
-                self._replace(depth)
+            if self._is_leaving:
+                self._repeated.add(sample.attachment)
+            if self._fit is not None and (depth := self._fit(sample.size)) < self._depth:
+                self._depth = self._queue.depth = depth
+                if self._channel is not None:
+                    self._use_channel()
             return sample
+        return self._waiting.popleft()
 
-    def _replace(self, depth: int) -> None:
-        """Receive by a new subscriber that keeps fewer samples."""
-        with self._call(f"subscribe to '{self._key}'"):
-            self._depth = depth
-            self._entities.append(self._declare(depth))
-            before = self._repeated if self._doubtful else set()
-            waiting = [sample for sample in self.take() if sample.attachment not in before]
-            self._repeated = before | {sample.attachment for sample in waiting} - {None}
-            self._doubtful = depth + len(self._repeated)
-            self._waiting = deque(waiting, depth)
-            old, new = self._entities
-            self._recv, self._try_recv = new.handler.recv, new.handler.try_recv
-            del self._entities[0]
-            old.undeclare()
-            del old, new
+    def _count_arrival(self) -> None:
+        """Count a sample, and become busy if they come often."""
+        self._count += 1
+        if self._count % _MANY or not self._may_be_busy:
+            return
+        before, self._counted_at = self._counted_at, time.monotonic()
+        if self._counted_at - before < _OFTEN_SECONDS and self._use_channel():
+            _busy.append(self)
+            _sweeper.wake()
+
+    def _use_channel(self) -> bool:
+        """Receive from a new channel from now on; return whether it was declared."""
+        try:
+            new = PullSubscriber(self._key, self._declare(zenoh.handlers.RingChannel(self._depth)))
+        except RoszError as error:
+            if not isinstance(error, ClosedError):
+                _log.warning("what comes often on '%s' is received slowly: %s", self._key, error)
+            return False
+        before = self._repeated if self._unchecked or self._is_leaving else set[bytes | None]()
+        if self._channel is None:
+            self._queue_declaration.close()
+            self._queue.ended.get()
+            taken = [Sample(raw) for raw in iter(self._queue.take, None)]
+        else:
+            taken = self._channel.take()
+            self._channel.close()
+        self._waiting.extend(sample for sample in taken if sample.attachment not in before)
+        self._repeated = before | {sample.attachment for sample in self._waiting} - {None}
+        self._unchecked = self._depth + len(self._repeated)
+        self._channel = new
+        if self._closed:  # meanwhile
+            new.close()
+        return True
+
+    def leave_channel_if_idle(self) -> None:
+        """Leave the channel in two idle calls: declare the queue beside it, then close the channel.
+
+        A call is idle if no sample came since the last one. Samples that were on their way when the
+        queue was declared are in the channel by the second call. Later ones are in both.
+        """
+        channel, count, self._count_at_sweep = self._channel, self._count_at_sweep, self._count
+        if channel is None:
+            return
+        if not self._idle or count != self._count_at_sweep:
+            queue, self._next_queue, self._is_leaving = self._next_queue, None, False
+            if queue is not None:
+                queue[0].close()
+        elif self._next_queue is not None:
+            channel.close()
+        else:
+            self._repeated, self._unchecked, self._is_leaving = set(), 0, True
+            with suppress(RoszError):  # the session may close meanwhile
+                self._next_queue = self._declare_queue()
+            if self._closed:
+                self.close()
+
+    def _return_to_queue(self) -> None:
+        """Receive from the next queue; without one the subscriber is closed."""
+        _busy.remove(self)
+        self._channel, self._idle = None, False
+        queue, self._next_queue, self._is_leaving = self._next_queue, None, False
+        if queue is not None:
+            self._queue_declaration, self._queue = queue
+            self._repeated.discard(None)
+            self._unchecked = self._depth + len(self._repeated)
+            self._queue.handle_with(self._serial)
+            if self._closed:  # meanwhile
+                self._queue_declaration.close()
+
+    def close(self) -> None:
+        """Undeclare it; a second call, or one after the end of the session, has no effect."""
+        self._closed = True
+        queue = self._next_queue or (None,)
+        for declared in filter(None, (self._queue_declaration, self._channel, queue[0])):
+            declared.close()
+
+
+def _sweep() -> None:
+    while _busy and not ENDING.wait(_IDLE_SECONDS):
+        for subscriber in _busy.copy():
+            subscriber.leave_channel_if_idle()
+
+
+_busy: list[QueueSubscriber] = []
+_sweeper = Serial(_sweep)
 
 
 class RawPublisher(Declared):

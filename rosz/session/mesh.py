@@ -28,6 +28,10 @@ _SPACE = "@rosz/links"
 _POLL_SECONDS = 0.002
 _LATER_POLL_SECONDS = 0.05
 _QUERY_TIMEOUT = 0.5
+_SILENT_SECONDS = 0.1
+"""Time after which a peer that does not tell its links is one that never does, such as a command or
+a node of ROS 2. Before that, its queryable may not be declared here yet, and it may know further
+peers. A command, which has to be fast, does not wait for that."""
 _MOST_PEERS = 60
 """Peers from which on a newcomer is told of cores, as every two sessions of a mesh are linked."""
 _ADVICE = "use a core for so many nodes (run 'rosz core', and start nodes with ROSZ_MODE=client)"
@@ -72,6 +76,7 @@ class MeshReadiness:
         self._stop = stop
         self._mesh = mesh
         self._key = links_key("*", machine="*" if everywhere else "")
+        self._replied: set[str] = set()
         self._lock = threading.RLock()  # a signal handler may call `when_linked` meanwhile
         self._callbacks: list[Callable[[], None]] = []
         if timeout:
@@ -116,7 +121,8 @@ class MeshReadiness:
             if now_linked != peers:
                 peers, latest = now_linked, now
             missing = self._missing(_QUERY_TIMEOUT) if now_linked and self._mesh else set()
-            if now_linked and not missing:
+            silent = self._link_timeout and self._mesh and set(now_linked) - self._replied
+            if now_linked and not missing and not (silent and now - latest < _SILENT_SECONDS):
                 self._warn_of_many(len(now_linked))
                 return
             if now - began >= self._timeout:
@@ -147,6 +153,7 @@ class MeshReadiness:
         linked: set[str] = set()
         for reply in self._session.get(self._key, timeout=min(timeout, _QUERY_TIMEOUT)):
             if reply.ok:
+                self._replied.add(reply.key.rpartition("/")[2])
                 try:
                     linked.update(msgspec.msgpack.decode(reply.payload, type=list[str]))
                 except msgspec.DecodeError as error:

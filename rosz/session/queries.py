@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 from typing import Any, Final, Literal, TypedDict
 
@@ -13,7 +13,7 @@ import zenoh
 from rosz.errors import ClosedError, TransportError, UsageError
 from rosz.lifecycle import Closing
 from rosz.session.at_exit import ClosedSession, leak_at_exit
-from rosz.session.channels import ItemChannel, open_channel
+from rosz.session.channels import open_channel
 from rosz.session.declared import Declared, translate_errors
 from rosz.session.samples import RawItem, Sample, Stamp, to_timestamp
 from rosz.worker import ENDING
@@ -242,8 +242,8 @@ class Query(RawItem, Closing):
         if ENDING.is_set():
             leak_at_exit(raw)
         else:
-            raw.drop()
-        del raw
+            with suppress(RuntimeError):  # a thread that is about to reply drops it afterwards
+                raw.drop()
 
     def __del__(self) -> None:
         """Close a query that nobody closed."""
@@ -253,7 +253,7 @@ class Query(RawItem, Closing):
 class Queryable(Declared):
     """A declared queryable that keeps its queries until a thread receives them."""
 
-    def __init__(self, key: str, entity: Any, channel: ItemChannel) -> None:
+    def __init__(self, key: str, entity: Any, channel: Any) -> None:
         super().__init__(f"queryable '{key}'", entity)
         self._recv = channel.recv
 

@@ -6,6 +6,7 @@ Arrived items wait in channels (`rosz.session.channels`), from which threads of 
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache, partial
@@ -18,13 +19,13 @@ import zenoh.ext
 from rosz.errors import ClosedError
 from rosz.lifecycle import Closable, Closing, Lifecycle
 from rosz.session.at_exit import OPEN, ClosedSession
-from rosz.session.channels import declare, declare_callback, declare_rare, open_channel
+from rosz.session.channels import declare, declare_callback, open_channel
 from rosz.session.config import SessionConfig
 from rosz.session.declared import (
-    BoundedSubscriber,
     Callbacks,
     Declared,
     PullSubscriber,
+    QueueSubscriber,
     RawPublisher,
     translate_errors,
 )
@@ -33,6 +34,7 @@ from rosz.session.opening import open_raw
 from rosz.session.queries import (
     PRIORITIES,
     TARGETS,
+    Priority,
     Querier,
     Query,
     Queryable,
@@ -43,7 +45,7 @@ from rosz.session.queries import (
     clamp_timeout,
 )
 from rosz.session.samples import HybridClock, Sample, Stamp, to_timestamp
-from rosz.session.token_watch import TokenWatch
+from rosz.session.token_watch import LOOK_SECONDS, TokenWatch
 from rosz.session.zenoh_workarounds import (
     close_links,
     close_links_at_once,
@@ -87,10 +89,13 @@ class Session(Closing):
         secured: Whether links beyond the machine need keys.
         zid: The id of the session, in lower-case hex.
         clock: The clock that stamps its writes.
+        others: The other sessions of this machine, as they were before it opened; if it is
+            registered itself, those that read them later see it.
     """
 
     def __init__(self, raw: zenoh.Session, *, secured: bool = False, rendezvous: str = "") -> None:
         self.secured = secured
+        self.others: LocalPeers = LocalPeers(rendezvous, ())
         self.zid: str = str(raw.zid())
         self.clock: HybridClock = HybridClock(self.zid)
         self._raw: Any = raw
@@ -117,7 +122,8 @@ class Session(Closing):
         """
         _runtime().check_open("open a session")
         if config.mode == "client" or (config.mode == "router" and not config.hold_rendezvous):
-            raw = open_raw(config, peers or LocalPeers.read(config.rendezvous))
+            others = peers or LocalPeers.read(config.rendezvous)
+            raw = open_raw(config, others)
             registration = None
         else:
             reachable = config.mode == "peer" or config.rendezvous_is_held
@@ -130,7 +136,7 @@ class Session(Closing):
                 raise
             registration.opened(str(raw.zid()))
         session = cls(raw, secured=config.keys is not None, rendezvous=config.rendezvous)
-        session._registration = registration
+        session._registration, session.others = registration, others
         if config.mode != "client" or config.reaches_beyond:
             session._link_watch = close_links_at_once(raw)
         return session
@@ -147,6 +153,7 @@ class Session(Closing):
         attachment: bytes | None = None,
         stamp: Stamp | None = None,
         block: bool = True,
+        priority: Priority = "normal",
     ) -> None:
         """Write a value.
 
@@ -156,6 +163,7 @@ class Session(Closing):
             attachment: The bytes to send beside the payload.
             stamp: The time of the write.
             block: Whether to wait for a slow link instead of dropping the write.
+            priority: Whether the write overtakes others that wait for a slow link.
         """
         with translate_errors("write", key):
             self._raw.put(
@@ -164,6 +172,7 @@ class Session(Closing):
                 attachment=attachment,
                 timestamp=to_timestamp(stamp),
                 congestion_control=_CONGESTION[block],
+                priority=PRIORITIES[priority],
             )
 
     def delete(
@@ -201,16 +210,17 @@ class Session(Closing):
         reliability = zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT
         qos: Any = {"congestion_control": _CONGESTION[block], "reliability": reliability}
         qos |= {"allowed_destination": _ORIGIN[remote_only], "express": express}
+        raw = self._raw  # before the check, since another thread may close the session
         self._lifecycle.check_open(f"publish on '{key}'")
         with translate_errors("publish on", key):
             if not cache:
-                return RawPublisher(key, self._raw.declare_publisher(key, **qos))
+                return RawPublisher(key, raw.declare_publisher(key, **qos))
             # As rmw_zenoh does it. Zenoh requires both arguments of the detection.
             detection = zenoh.ext.MissDetectionConfig(
                 heartbeat=None, sporadic_heartbeat=_HEARTBEAT_SECONDS
             )
             caching = zenoh.ext.declare_advanced_publisher(
-                self._raw,
+                raw,
                 key,
                 cache=zenoh.ext.CacheConfig(cache),
                 publisher_detection=True,
@@ -225,7 +235,6 @@ class Session(Closing):
         callback: Callable[[Sample], None],
         *,
         history: int = 0,
-        recover: bool = False,
         remote_only: bool = False,
         rare: bool = False,
     ) -> Closable:
@@ -236,67 +245,61 @@ class Session(Closing):
             callback: Function called with each sample on the subscriber's thread; it should return
                 soon.
             history: The number of samples to ask each transient-local publisher for.
-            recover: Whether to notice and fetch samples that were missed.
             remote_only: Whether to ignore samples of this session itself.
             rare: Whether samples arrive rarely, and may wait; waiting for them costs less then.
         """
         make = declare_callback if rare else declare
-        declared = make(
-            lambda handler: self._subscribe(key, handler, history, recover, remote_only)
-        )
+        declared = make(lambda handler: self._subscribe(key, handler, history, False, remote_only))
         return Callbacks(f"subscriber '{key}'", declared, lambda raw: callback(Sample(raw)))
 
-    def pull_subscriber(
-        self,
-        key: str,
-        depth: int,
-        *,
-        history: int = 0,
-        recover: bool = False,
-        remote_only: bool = False,
-    ) -> PullSubscriber:
+    def pull_subscriber(self, key: str, depth: int, *, remote_only: bool = False) -> PullSubscriber:
         """Declare a subscriber that keeps the newest samples until a thread receives them.
-
-        This is the fastest kind of subscriber: no other thread of Python is involved.
 
         Args:
             key: The key expression to subscribe to.
             depth: The number of samples to keep; a new one replaces the oldest.
-            history: The number of samples to ask each transient-local publisher for.
-            recover: Whether to notice and fetch samples that were missed.
             remote_only: Whether to ignore samples of this session itself.
         """
         handler: Any = zenoh.handlers.RingChannel(depth)
-        return PullSubscriber(key, self._subscribe(key, handler, history, recover, remote_only))
+        return PullSubscriber(key, self._subscribe(key, handler, 0, False, remote_only))
 
-    def bounded_subscriber(self, key: str, depth: int, fit: Callable[[int], int]) -> PullSubscriber:
-        """Declare a subscriber that keeps fewer samples if they are large.
+    def queue_subscriber(
+        self,
+        key: str,
+        depth: int,
+        handle: Callable[[Sample], object],
+        *,
+        fit: Callable[[int], int] | None = None,
+        history: int = 0,
+        recover: bool = False,
+    ) -> Closable:
+        """Declare a subscriber that keeps the newest samples, and handles them one at a time.
 
         Args:
             key: The key expression to subscribe to.
             depth: The largest number of samples to keep; a new one replaces the oldest.
-            fit: Function that returns how many samples of a size in bytes may wait. It is called
-                with each sample; the number that it returns should rarely fall.
+            handle: Function called with each sample, on a thread of Python; it may take its time.
+            fit: Function that returns how many samples of a size in bytes may wait, where these are
+                fewer than the depth. It is called with each sample; the number that it returns
+                should rarely fall.
+            history: The number of samples to ask each transient-local publisher for.
+            recover: Whether to notice and fetch samples that were missed.
         """
-
-        def declare(count: int) -> Any:
-            handler: Any = zenoh.handlers.RingChannel(count)
-            return self._subscribe(key, handler, history=0, recover=False, remote_only=False)
-
-        return BoundedSubscriber(key, declare, depth, fit)
+        declare = partial(self._subscribe, key, history=history, recover=recover, remote_only=False)
+        return QueueSubscriber(key, declare, depth, handle, fit=fit, history=bool(history))
 
     def _subscribe(
         self, key: str, handler: Any, history: int, recover: bool, remote_only: bool
     ) -> Any:
-        origin = _ORIGIN[remote_only]
+        raw, origin = self._raw, _ORIGIN[remote_only]
         self._lifecycle.check_open(f"subscribe to '{key}'")
         with translate_errors("subscribe to", key):
             if not history:
-                return self._raw.declare_subscriber(key, handler, allowed_origin=origin)
+                return raw.declare_subscriber(key, handler, allowed_origin=origin)
             # As rmw_zenoh does it.
             recovery = zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
             return zenoh.ext.declare_advanced_subscriber(
-                self._raw,
+                raw,
                 key,
                 handler,
                 history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history),
@@ -323,7 +326,7 @@ class Session(Closing):
         return Callbacks(f"queryable '{key}'", declared, lambda raw: callback(Query(raw)))
 
     def pull_queryable(
-        self, key: str, *, complete: bool = False, remote_only: bool = False, rare: bool = False
+        self, key: str, *, complete: bool = False, remote_only: bool = False
     ) -> Queryable:
         """Declare a queryable that keeps its queries until a thread receives them.
 
@@ -331,12 +334,10 @@ class Session(Closing):
             key: The key expression whose queries get replies here.
             complete: Whether the replies are all there are; ROS 2 clients query only such.
             remote_only: Whether to ignore the queries of this session itself.
-            rare: Whether queries arrive rarely; waiting for them costs less then.
         """
-        make = declare_rare if rare else declare
         options: Any = {"complete": complete, "allowed_origin": _ORIGIN[remote_only]}
         with translate_errors("serve", key):
-            return Queryable(key, *make(partial(self._raw.declare_queryable, key, **options)))
+            return Queryable(key, *declare(partial(self._raw.declare_queryable, key, **options)))
 
     def token(self, key: str) -> Closable:
         """Declare a liveliness token, which others see until it is closed or the link ends."""
@@ -447,13 +448,24 @@ class Session(Closing):
         if not lend_thread(deliver):
             deliver()
 
-    def live_tokens(self, key: str, timeout: float) -> list[str]:
-        """Return the keys of all liveliness tokens that match, sorted."""
+    def live_tokens(self, key: str, timeout: float, looks: int = 1) -> list[str]:
+        """Return the keys of all liveliness tokens that match, sorted.
+
+        One query may miss a token on a busy machine. The results of ``looks`` queries are united.
+        """
+        live = set(self.query_tokens(key, timeout)())
+        for _ in range(looks - 1):
+            time.sleep(LOOK_SECONDS)
+            live.update(self.query_tokens(key, timeout)())
+        return sorted(live)
+
+    def query_tokens(self, key: str, timeout: float) -> Callable[[], list[str]]:
+        """Query liveliness tokens; the function returned waits for what `live_tokens` returns."""
         with translate_errors("look for tokens", key):
             handler = self._raw.liveliness().get(
                 key, open_channel(), timeout=clamp_timeout(timeout)
             )
-        return sorted({reply.key for reply in Replies(handler) if reply.ok})
+        return lambda: sorted({reply.key for reply in Replies(handler) if reply.ok})
 
     def peers(self, *, routers: bool = True) -> list[str]:
         """Return the ids of the peers that this session is linked to, and of the routers."""

@@ -30,6 +30,7 @@ _PERIOD = 2.0
 _TIMEOUT = 3.0
 _STABLE_SECONDS = 12.0
 _LONGEST_STABLE_SECONDS = 1920.0
+_MOST_CORES = 1000
 _log = logging.getLogger("rosz.core")
 
 _CLOCK = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
@@ -128,7 +129,7 @@ class SplitWatch:
         self._on_split = on_split
         self._space = own_key(domain, _SPACE)
         self._key = f"{self._space}/{session.zid}"
-        self._known: set[str] = set()
+        self._cores: list[str] = []  # that replied; those that did so last are at the end
         self._differences = ViewDifferences(
             min(_STABLE_SECONDS * 2**times, _LONGEST_STABLE_SECONDS)
         )
@@ -156,10 +157,10 @@ class SplitWatch:
     def _compare(self) -> None:
         replies = self._replies()
         own = self._view()
-        self._known |= replies.keys()
+        self._cores = [*(zid for zid in self._cores if zid not in replies), *replies][-_MOST_CORES:]
         reachable = own.keys() | set(self._session.peers())
         others: dict[str, CoreView | None] = {
-            zid: replies.get(zid) for zid in self._known & reachable
+            zid: replies.get(zid) for zid in self._cores if zid in reachable
         }
         split = self._differences.update(own, others, time.monotonic())
         if split is None:

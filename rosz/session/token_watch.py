@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 import zenoh
 
@@ -13,15 +14,21 @@ from rosz.session.queries import Replies
 
 _UNSETTLED_SECONDS = 10.0
 """Seconds from its beginning in which a watch may be told of the end of a token first."""
+_LOOKS = 6
+"""Queries that must all miss a token before it counts as ended."""
+LOOK_SECONDS = 0.02
+"""Seconds between them. On a busy machine one query in 30 missed a token if each followed the last
+at once, up to five in a row; with this pause one in 500, and never two in a row."""
 
 
 class TokenWatch:
     """Reports tokens, on the thread of its watch.
 
-    Seen with eclipse-zenoh 1.10.2: a watch that begins while tokens disappear may be told of the
-    end of some of these first, and then that they exist. `tests/interop/test_hostile.py` shows it;
-    it is not reported upstream yet. Only for such tokens a query decides: while tokens come and go,
-    a query may miss some that exist.
+    Seen with eclipse-zenoh 1.10.2, and not reported upstream yet: a watch that begins while tokens
+    disappear may be told of the end of some of these first, and then that they exist
+    (`tests/interop/test_hostile.py`). Of a query on a busy machine some replies come after its end:
+    the query misses their tokens, and the session tells all later watches that one of these exists,
+    for ever (`tests/upstream/late_reply.py`). Only for such tokens further queries decide.
 
     Args:
         callback: Function called with the key of a token, and with whether it appeared (true) or
@@ -45,7 +52,7 @@ class TokenWatch:
         self._callback = callback
         self._own = own
         self._live = live
-        self._missing: set[str] = set()
+        self._named: set[str] = set()
         self._seen: set[str] = set()
         self._appeared: set[str] = set()
         self._gone: set[str] = set()
@@ -55,7 +62,7 @@ class TokenWatch:
         """Wait for the tokens that a query finds."""
         if self.existing is not None:
             replies, self.existing = self.existing, None
-            self._missing = {reply.key for reply in replies if reply.ok}
+            self._named = {reply.key for reply in replies if reply.ok}
             del replies
 
     def deliver(self, sample: zenoh.Sample) -> None:
@@ -64,38 +71,37 @@ class TokenWatch:
         self._note(token, alive=alive)
         # Before the watch is complete, one query for all of these comes at the end.
         ended = alive and self.complete is None and token in self._gone
-        if ended and token not in self._alive({token}):
-            return
-        own = self._own.get(token)
-        # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
-        if alive or own is None or own.closed:
-            self._callback(token, alive)
+        if not (ended and self._ended({token})):
+            self._report(token, alive)
 
     def idle(self) -> None:
         """Report that all tokens that existed have been reported, if they have."""
         report = self.complete
-        if report is not None and self._is_complete():
-            if doubtful := self._appeared & self._gone:
-                for token in doubtful - self._alive(doubtful):  # it disappeared unnoticed
-                    self._callback(token, False)
+        if report is None:
+            return
+        # The watch is not told of a token whose process died while the watch began.
+        self._named -= self._ended(self._named - self._seen)
+        if self._named <= self._seen:
+            for token in self._ended(self._appeared - (self._named - self._gone)):
+                self._report(token, False)  # it disappeared unnoticed
             self.complete = None
             report()
 
-    def _is_complete(self) -> bool:
-        """Return whether all tokens of the query have been reported, but those that ended before.
+    def _ended(self, tokens: set[str]) -> set[str]:
+        """Return those of some tokens that are not alive."""
+        with suppress(ClosedError, TransportError):
+            for look in range(_LOOKS):
+                if tokens:
+                    time.sleep(LOOK_SECONDS if look else 0.0)
+                    tokens = tokens.difference(self._live())
+            return tokens
+        return set()  # the watch ends with its session
 
-        The watch is not told of a token whose process died while the watch began.
-        """
-        missing = self._missing - self._seen
-        if missing:
-            self._missing = missing.intersection(self._alive(missing))
-        return self._missing <= self._seen
-
-    def _alive(self, otherwise: set[str]) -> set[str]:
-        try:
-            return set(self._live())
-        except (ClosedError, TransportError):
-            return otherwise  # the watch ends with its session
+    def _report(self, token: str, alive: bool) -> None:
+        own = self._own.get(token)
+        # See `tests/upstream/own_token.py`: it may have disappeared somewhere else only.
+        if alive or own is None or own.closed:
+            self._callback(token, alive)
 
     def _note(self, token: str, *, alive: bool) -> None:
         if self.complete is not None:

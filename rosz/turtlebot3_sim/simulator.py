@@ -143,7 +143,7 @@ class Turtlebot3Simulator:
         with self._lock:
             self._robot.step(STEP_NS / _SECOND)
             before, self._time = self._time, self._time + STEP_NS
-            self._clock.publish(Clock(_message_time(self._time)))
+            self._clock.publish(Clock(Time.from_nsec(self._time)))
             now = self._stamp()
             if _passes(before, self._time, _ODOMETRY_HZ):
                 self._odometry.publish(_odometry(self._robot, now))
@@ -155,7 +155,7 @@ class Turtlebot3Simulator:
 
     def _stamp(self) -> Any:
         simulated = self._node.clock.simulated
-        return _message_time(self._time if simulated else time.time_ns())
+        return Time.from_nsec(self._time if simulated else time.time_ns())
 
 
 def main() -> None:
@@ -169,10 +169,6 @@ def main() -> None:
 def _passes(before: int, now: int, hz: float) -> bool:
     """Return whether a periodic event is due between two times in nanoseconds."""
     return int(before * hz // _SECOND) != int(now * hz // _SECOND)
-
-
-def _message_time(nanoseconds: int) -> Time:
-    return Time(*divmod(nanoseconds, _SECOND))
 
 
 def _odometry(robot: Robot, now: Time) -> Odometry:

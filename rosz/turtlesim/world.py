@@ -66,7 +66,7 @@ class Canvas:
         return red, green, blue
 
     def line(self, start: Point, end: Point, width: float, color: Color) -> None:
-        """Draw a straight line with round ends, which may be equal; the width is in pixels."""
+        """Draw a line with round ends, ``width`` pixels wide; start and end may be equal."""
         radius = width / 2
         body = _body(start, end, radius)
         top = max(0, math.ceil(min(start[1], end[1]) - radius))
@@ -116,13 +116,8 @@ def _body(start: Point, end: Point, radius: float) -> tuple[Point, ...]:
     length = math.hypot(x2 - x1, y2 - y1)
     if length == 0:
         return (start, end)
-    across, down = (y1 - y2) * radius / length, (x2 - x1) * radius / length
-    return (
-        (x1 + across, y1 + down),
-        (x2 + across, y2 + down),
-        (x2 - across, y2 - down),
-        (x1 - across, y1 - down),
-    )
+    dx, dy = (y1 - y2) * radius / length, (x2 - x1) * radius / length
+    return ((x1 + dx, y1 + dy), (x2 + dx, y2 + dy), (x2 - dx, y2 - dy), (x1 - dx, y1 - dy))
 
 
 class Pen(msgspec.Struct, frozen=True):
@@ -142,7 +137,7 @@ class Turtle:
         y: Distance from the lower edge in units.
         theta: Heading in rad, counter-clockwise from the x axis.
         kind: Number of its appearance.
-        sees: Color below the turtle, before it drew the last step.
+        sees: Color below the turtle, before the line of its last step was drawn.
     """
 
     x: float
@@ -154,7 +149,7 @@ class Turtle:
     turn: float = 0.0
     pen: Pen = field(default_factory=Pen)
     sees: Color = (0, 0, 0)
-    _commanded: float = -math.inf
+    _commanded_at: float = -math.inf
     _jumps: list[Callable[[], None]] = field(default_factory=list)
 
     @property
@@ -168,14 +163,14 @@ class Turtle:
         return math.hypot(self.forward, self.left)
 
     def command(self, now: float, *, forward: float, left: float, turn: float) -> None:
-        """Set the speeds for the next second, from a time of the same clock as for `step`.
+        """Set the speeds for one second from ``now``, a time of the clock of `step`.
 
         Raises:
             UsageError: A speed is infinite or not a number.
         """
         _check_finite(forward=forward, left=left, turn=turn)
         self.forward, self.left, self.turn = forward, left, turn
-        self._commanded = now
+        self._commanded_at = now
 
     def teleport_to(self, x: float, y: float, theta: float) -> None:
         """Move to a place at the next step, and draw a line there; the numbers must be finite."""
@@ -198,13 +193,13 @@ class Turtle:
         self._jumps.append(jump)
 
     def step(self, picture: Canvas, now: float) -> Point | None:
-        """Move for `STEP_SECONDS`, and draw; return the place behind a wall that stopped it."""
+        """Move for `STEP_SECONDS`, and draw; return the point behind the wall if one stopped it."""
         for jump in self._jumps:
             before = self.x, self.y
             jump()
             self._draw(picture, before)
         self._jumps.clear()
-        if now - self._commanded > _COMMAND_SECONDS:
+        if now - self._commanded_at > _COMMAND_SECONDS:
             self.forward = self.left = self.turn = 0.0
         before = self.x, self.y
         self.theta = _normal(self.theta + self.turn * STEP_SECONDS)
@@ -252,7 +247,7 @@ class World:
     def __init__(self, background: Color = BACKGROUND) -> None:
         self.field: Canvas = Canvas(FIELD_PIXELS, FIELD_PIXELS, background)
         self.turtles: dict[str, Turtle] = {}
-        self._named = 0
+        self._last_number = 0
         self._spawned = 0
 
     def spawn(self, x: float, y: float, theta: float, name: str = "") -> str:
@@ -270,10 +265,10 @@ class World:
         return name
 
     def free_name(self) -> str:
-        """Return the next name for a turtle without one."""
+        """Return a default name that no turtle has."""
         while True:
-            self._named += 1
-            name = f"turtle{self._named}"
+            self._last_number += 1
+            name = f"turtle{self._last_number}"
             if name not in self.turtles:
                 return name
 
@@ -290,12 +285,12 @@ class World:
     def reset(self, background: Color) -> str:
         """Restart with one turtle, and return its name."""
         self.turtles.clear()
-        self._named = self._spawned = 0
+        self._last_number = self._spawned = 0
         self.clear(background)
         return self.spawn(START, START, 0.0)
 
     def step(self, now: float) -> Iterator[tuple[str, Point]]:
-        """Move all turtles by one step, at a time as for `Turtle.command`.
+        """Move all turtles by one step; ``now`` is a time of the clock of `Turtle.command`.
 
         Yields the name of each that hit a wall, and the place behind the wall where it was going.
         """

@@ -27,6 +27,8 @@ _OWN_PATH = re.compile(r"/(?![/\\])[^\x00-\x1f\x7f]*")
 """A path of this server: browsers take ``//x`` and ``/\\x`` for another host, and skip tabs."""
 _TOO_MANY = "{} pages are open, which is the limit; close some, and load this one again."
 _POLICY = 1008
+_LEFT = (("No response returned.",), ("REQUEST_METHOD",))
+"""Arguments of the errors that Starlette and engineio raise if a browser leaves too early."""
 _FRESH = {"cache-control": "no-store"}
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>rosz</title>
 <meta name="viewport" content="width=device-width, initial-scale=1"><style>
@@ -80,7 +82,14 @@ class AccessMiddleware:
                     answer = _refusal(_MALFORMED, "<p>The request is malformed.</p>")
                 if answer is not app and scope["type"] == "websocket":
                     answer = WebSocketClose(_POLICY)
-            await answer(scope, receive, send)
+            try:
+                await answer(scope, receive, send)
+            except (RuntimeError, KeyError, ValueError) as error:
+                if scope["type"] == "websocket" and isinstance(error, ValueError):
+                    # engineio raises it for a frame that it cannot parse, and closes nothing.
+                    await WebSocketClose(_POLICY)(scope, receive, send)
+                elif error.args[:1] not in _LEFT:  # uvicorn reports it
+                    raise
 
         return checked
 

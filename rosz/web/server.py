@@ -12,7 +12,9 @@ import socket
 import ssl
 import threading
 from collections.abc import Callable
+from inspect import isawaitable
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -36,13 +38,30 @@ _ANSWER_SECONDS = 20.0
 """Seconds within which a browser must answer a ping: one that draws much in 3D without a graphics
 processor, or that opens a page on a busy machine, answers late. It would lose its forms."""
 _LOGGERS = ("nicegui", "uvicorn.error")
+_log = logging.getLogger("rosz.web")
 _NICENESS = 10
 """Niceness of the threads of the server, so that nodes of the machine run before the pages."""
 
 
-def _wait_for_answers() -> None:
+def _prepare_links() -> None:
     core.sio.eio.ping_interval = _PING_SECONDS
     core.sio.eio.ping_timeout = _ANSWER_SECONDS
+    for handlers in (core.sio.eio.handlers, core.sio.handlers["/"]):
+        for name in handlers.keys() - {"connect", "disconnect"}:
+            handlers[name] = _checked(handlers[name])
+
+
+def _checked(handler: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a handler that drops malformed messages, and logs a line for each of them."""
+
+    async def handle(*words: object) -> Any:
+        try:
+            result = handler(*words)
+            return await result if isawaitable(result) else result
+        except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+            _log.warning("dropping a malformed message of a page: %r", error)
+
+    return handle
 
 
 class _Server(uvicorn.Server):
@@ -102,7 +121,8 @@ class PageServer:
             reconnect_timeout=_RECONNECT_SECONDS,
             show_welcome_message=False,
         )
-        pages.on_startup(_wait_for_answers)
+        pages.on_startup(_prepare_links)
+        logging.getLogger("asyncio").setLevel(logging.ERROR)  # it warns of browsers that leave
         config = uvicorn.Config(
             middleware.protect(app, _open_pages),
             log_level="warning",

@@ -4,8 +4,8 @@
 with ``@rosz/<domain>``, a verbatim chunk that the wildcards of ROS 2 tools never match.
 
 rmw_zenoh declares ``@ros2_lv/<domain>/<zid>/<nid>/<eid>/<kind>/<enclave>/<namespace>/<node>`` for a
-node, and for an entity the same with ``/<name>/<type>/<hash>/<qos>`` after it. rosz nodes also
-declare which process they are, and since when:
+node, and for an entity the same with ``/<name>/<type>/<hash>/<qos>`` after it. A node of rosz also
+declares its process and its start:
 ``@rosz/<domain>/node/<zid>/<nid>/<started>/<pid>/<host>/<full name>``. Every ``/`` inside a chunk
 is written ``%``. The QoS is
 ``<reliability>:<durability>:<history>,<depth>:<deadline>:<lifespan>:<liveliness>,<lease>`` with
@@ -137,7 +137,7 @@ def tokens_key(domain: int | Literal["*"], zid: str = "*") -> str:
 def entities_key(domain: int, kind: Kind, name: str) -> str:
     """Return a key expression for the tokens of one kind of entity of a topic or service.
 
-    It matches other names that end alike, too, because some participants leave the first slash out.
+    It also matches longer names with this end: some participants leave out the first slash.
     """
     return f"{SPACE}/{domain}/*/*/*/{kind.value}/*/*/*/$*{_chunk(name).lstrip('%') or '_'}/**"
 
@@ -164,7 +164,7 @@ def nodes_key(domain: int, zid: str = "*") -> str:
 
 
 def _chunk(name: str) -> str:
-    """Return a chunk that matches a name; characters that no token has become others."""
+    """Return a chunk that matches a name; characters that no token may have become ``_``."""
     return _FORBIDDEN.sub("_", name.replace("/", "%")) or "%"
 
 

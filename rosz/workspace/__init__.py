@@ -18,15 +18,4 @@ if TYPE_CHECKING:
     from rosz.workspace.migration import Migration, migrate
     from rosz.workspace.problem import Problem
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "ament": "LICENSES AmentPackage",
-            "checks": "Checked check find_packages",
-            "creation": "create write_setup",
-            "editor": "editor_folder write_stubs",
-            "generate": "Generator",
-            "migration": "Migration migrate",
-            "problem": "Problem",
-        },
-    )
+    __getattr__ = exports_of(__name__)

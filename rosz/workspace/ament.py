@@ -10,6 +10,7 @@ import msgspec
 
 from rosz.errors import LaunchError, UsageError
 from rosz.names import is_valid
+from rosz.workspace.creation import fill_template
 
 LICENSES = (
     "Apache-2.0",
@@ -24,70 +25,6 @@ LICENSES = (
     "MIT-0",
 )
 """The licenses that get a file of their own, by their names in SPDX."""
-
-_SETUP = """\
-from setuptools import find_packages, setup
-
-package_name = {name!r}
-
-setup(
-    name=package_name,
-    version="0.0.0",
-    packages=find_packages(exclude=["test"]),
-    data_files=[
-        ("share/ament_index/resource_index/packages", [f"resource/{{package_name}}"]),
-        (f"share/{{package_name}}", ["package.xml"]),
-    ],
-    install_requires=["setuptools"],
-    zip_safe=True,
-    maintainer={maintainer!r},
-    maintainer_email={email!r},
-    description={description!r},
-    license={license!r},
-    tests_require=["pytest"],
-    entry_points={{
-        "console_scripts": [
-{scripts}        ],
-    }},
-)
-"""
-_SETUP_CFG = """\
-[develop]
-script_dir=$base/lib/{name}
-[install]
-install_scripts=$base/lib/{name}
-"""
-_PYTHON_NODE = """\
-def main():
-    print("Hi from {name}.")
-
-
-if __name__ == "__main__":
-    main()
-"""
-_TEST = """\
-import pytest
-
-
-@pytest.mark.linter
-def test_{linter}():
-    module = pytest.importorskip("ament_{linter}.main")
-    assert module.main(argv=["."]) == 0
-"""
-_CMAKE = """\
-cmake_minimum_required(VERSION 3.8)
-project({name})
-
-{buildtool}{dependencies}{program}{end}"""
-_CPP_NODE = """\
-#include <cstdio>
-
-int main()
-{{
-  std::printf("hello world {name} package\\n");
-  return 0;
-}}
-"""
 
 
 class AmentPackage(msgspec.Struct, frozen=True, kw_only=True):
@@ -166,14 +103,14 @@ class AmentPackage(msgspec.Struct, frozen=True, kw_only=True):
         entry = f'            "{self.node} = {self.name}.{self.node}:main",\n' if self.node else ""
         fields = msgspec.structs.asdict(self) | {"email": self._address}
         yield f"{self.name}/", ""
-        yield "setup.py", _SETUP.format(**fields, scripts=entry)
-        yield "setup.cfg", _SETUP_CFG.format(name=self.name)
+        yield "setup.py", fill_template("ament_setup.py", **fields, scripts=entry)
+        yield "setup.cfg", fill_template("ament_setup.cfg", name=self.name)
         yield f"resource/{self.name}", ""
         yield f"{self.name}/__init__.py", ""
         for linter in ("copyright", "flake8", "pep257"):
-            yield f"test/test_{linter}.py", _TEST.format(linter=linter)
+            yield f"test/test_{linter}.py", fill_template("ament_lint.py", linter=linter)
         if self.node:
-            yield f"{self.name}/{self.node}.py", _PYTHON_NODE.format(name=self.name)
+            yield f"{self.name}/{self.node}.py", fill_template("ament_node.py", name=self.name)
         if self.library:
             yield f"{self.name}/{self.library}/__init__.py", ""
 
@@ -182,7 +119,7 @@ class AmentPackage(msgspec.Struct, frozen=True, kw_only=True):
         yield f"include/{self.name}/", ""
         yield "CMakeLists.txt", self._cmake()
         if self.node:
-            yield f"src/{self.node}.cpp", _CPP_NODE.format(name=self.name)
+            yield f"src/{self.node}.cpp", fill_template("ament_node.cpp", name=self.name)
 
     def _cmake(self) -> str:
         ament = self.build_type == "ament_cmake"
@@ -193,7 +130,8 @@ class AmentPackage(msgspec.Struct, frozen=True, kw_only=True):
                 f"\nadd_executable({self.node} src/{self.node}.cpp)\n"
                 f"install(TARGETS {self.node} DESTINATION lib/${{PROJECT_NAME}})\n"
             )
-        return _CMAKE.format(
+        return fill_template(
+            "ament_CMakeLists.txt",
             name=self.name,
             buildtool="find_package(ament_cmake REQUIRED)\n" if ament else "",
             dependencies=needed,

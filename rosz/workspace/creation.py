@@ -18,70 +18,8 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
 _SCRIPT = "scripts/talker.py"
 
-_MANIFEST = """\
-<?xml version="1.0"?>
-<package format="2">
-  <name>{name}</name>
-  <version>0.0.1</version>
-  <description>{description}</description>
-  <maintainer email="user@example.com">{maintainer}</maintainer>
-  <license>{license_name}</license>
-{dependencies}</package>
-"""
-
-_BUILD = """\
-cmake_minimum_required(VERSION 3.0.2)
-project({name})
-
-find_package(catkin REQUIRED{components})
-
-catkin_package()
-"""
-
-_MESSAGE = """\
-# A number, and what to call it.
-int64 data
-string name
-"""
-
-_TALKER = '''\
-#!/usr/bin/env python3
-"""Publish a number, counting up."""
-
-import rosz
-from {name}.msg import Number
-
-with rosz.Node("talker") as node:
-    numbers = node.publisher("numbers", Number, queue_size=10)
-    rate = node.params.get("~rate", 1.0)
-    for tick in node.rate(rate):
-        numbers.publish(Number(data=tick, name="tick"))
-        node.log.info("published %d", tick)
-'''
-
-_LAUNCH = """\
-<launch>
-  <arg name="rate" default="1.0" doc="numbers per second"/>
-  <node pkg="{name}" type="talker.py" name="talker" output="screen">
-    <param name="rate" value="$(arg rate)"/>
-  </node>
-</launch>
-"""
-
+_TEMPLATES = Path(__file__).with_name("templates")
 _MARK = "# written by rosz pkg check --setup"
-_POSIX = """\
-{mark}: the packages of this workspace are found, and ROS 1's commands mean rosz
-case ":${{ROSZ_PACKAGE_PATH-}}:" in
-  *:{source}:*) ;;
-  *) export ROSZ_PACKAGE_PATH={source}"${{ROSZ_PACKAGE_PATH:+:$ROSZ_PACKAGE_PATH}}" ;;
-esac
-"""
-_FISH = """\
-{mark}: the packages of this workspace are found, and ROS 1's commands mean rosz
-if not contains {source} (string split : -- "$ROSZ_PACKAGE_PATH")
-    set -gx ROSZ_PACKAGE_PATH (string trim --right --chars : -- {source}:"$ROSZ_PACKAGE_PATH")
-end
-"""
 
 
 def create(
@@ -100,7 +38,7 @@ def create(
         parent: Folder to create the package in.
         name: Name of the package.
         dependencies: Names of packages that it needs.
-        bare: Whether to create only two files, and empty folders.
+        bare: Whether to create only package.xml, CMakeLists.txt and empty folders.
         description: Description for package.xml.
         maintainer: Name of the maintainer.
         license_name: Name of the license.
@@ -117,15 +55,15 @@ def create(
     empty: list[Path] = []
     if bare:
         components = f" COMPONENTS {' '.join(dependencies)}" if dependencies else ""
-        files["CMakeLists.txt"] = _BUILD.format(name=name, components=components)
+        files["CMakeLists.txt"] = fill_template("CMakeLists.txt", name=name, components=components)
         if "roscpp" in dependencies:
             empty.append(folder / "include" / name)
         if {"roscpp", "rospy"} & {*dependencies}:
             empty.append(folder / "src")
     else:
-        files["msg/Number.msg"] = _MESSAGE
-        files[_SCRIPT] = _TALKER.format(name=name)
-        files["launch/talker.launch"] = _LAUNCH.format(name=name)
+        files["msg/Number.msg"] = fill_template("Number.msg")
+        files[_SCRIPT] = fill_template("talker.py", name=name)
+        files["launch/talker.launch"] = fill_template("talker.launch", name=name)
     _write(folder, files)
     for inner in empty:
         inner.mkdir(parents=True)
@@ -142,7 +80,8 @@ def _manifest(
             f"'{name}' is not a valid package name; expected lower-case letters, digits and"
             " '_', a letter first"
         )
-    return _MANIFEST.format(
+    return fill_template(
+        "package.xml",
         name=name,
         description=escape(description or f"The {name} package"),
         maintainer=escape(maintainer or "user"),
@@ -151,6 +90,11 @@ def _manifest(
             f"  <depend>{escape(dependency)}</depend>\n" for dependency in dependencies
         ),
     )
+
+
+def fill_template(file: str, **values: object) -> str:
+    """Return the text of a file in ``templates``, with values in its braces."""
+    return (_TEMPLATES / f"{file}.in").read_text("utf-8").format(**values)
 
 
 def _write(folder: Path, files: Mapping[str, str]) -> None:
@@ -189,6 +133,6 @@ def write_setup(workspace: Path, scripts: Mapping[str, str]) -> list[Path]:
             )
     folder.mkdir(exist_ok=True)
     for file, text in files.items():
-        head = _FISH if file.suffix == ".fish" else _POSIX
-        file.write_text(head.format(mark=_MARK, source=source) + text, encoding="utf-8")
+        shell = "setup.fish" if file.suffix == ".fish" else "setup.sh"
+        file.write_text(fill_template(shell, mark=_MARK, source=source) + text, encoding="utf-8")
     return list(files)

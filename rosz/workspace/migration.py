@@ -13,6 +13,7 @@ import re
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
+from functools import cache
 from importlib.machinery import PathFinder
 from pathlib import Path
 
@@ -30,39 +31,7 @@ from rosz.workspace.programs import compiled_programs
 
 _OWN_EXTRAS = {"cv2": "vision", "numpy": "numpy", "serial": "serial"}
 """Modules from PyPI, and the extra of rosz that installs each."""
-# Modules from PyPI whose distribution has the same name.
-_SAME_NAMES = (
-    "PyQt5 casadi cherrypy control cvxopt dash docker flask gym h5py imutils jinja2 keras "
-    "lxml matplotlib mediapipe mock netifaces networkx nose numba open3d "
-    "osrf_pycommon pandas parameterized pexpect plotly psutil pyaudio pycurl pygame "
-    "pymodbus pymongo pynput pyproj pyqtgraph pytest pyttsx3 requests scipy seaborn "
-    "setuptools shapely simplejson six sympy tabulate tensorflow termcolor tornado torch "
-    "torchvision tqdm transforms3d trimesh twisted ultralytics utm vosk websockets xmltodict"
-)
-_DISTRIBUTIONS = {
-    "Crypto": "pycryptodome",
-    "OpenGL": "PyOpenGL",
-    "PIL": "pillow",
-    "bluetooth": "PyBluez",
-    "bs4": "beautifulsoup4",
-    "dateutil": "python-dateutil",
-    "git": "GitPython",
-    "google": "protobuf",
-    "jwt": "PyJWT",
-    "magic": "python-magic",
-    "paho": "paho-mqtt",
-    "pkg_resources": "setuptools",
-    "skimage": "scikit-image",
-    "sklearn": "scikit-learn",
-    "smbus": "smbus2",
-    "speech_recognition": "SpeechRecognition",
-    "usb": "pyusb",
-    "websocket": "websocket-client",
-    "wx": "wxPython",
-    "zmq": "pyzmq",
-    **{name: name for name in _SAME_NAMES.split()},
-}
-"""Modules from PyPI that programs of ROS often import, and the distribution of each."""
+_DISTRIBUTIONS_FILE = Path(__file__).with_name("distributions.txt")
 _IMPORT_ERRORS = frozenset({"ImportError", "ModuleNotFoundError", "Exception"})
 # The limit is needed because the whole file is parsed again after each line of Python 2.
 _MOST_LINES = 200
@@ -236,8 +205,8 @@ class _Imports:
             return _files_of(code.parent, name), "", ""
         if self._has_types(root) or _is_installed(root):
             return [], "", ""
-        if root in _DISTRIBUTIONS:
-            return [], _DISTRIBUTIONS[root], ""
+        if root in _distributions():
+            return [], _distributions()[root], ""
         instead = instead_of(name) or instead_of(root)
         return [], "", f"{root} ({instead})" if instead else root
 
@@ -246,6 +215,14 @@ class _Imports:
         if self._store.has(package, "msg") or self._store.has(package, "srv"):
             return True
         return package in self._names and any((self._names[package] / "cfg").glob("*.cfg"))
+
+
+@cache
+def _distributions() -> dict[str, str]:
+    """Return the distributions of modules from PyPI that programs of ROS often import."""
+    lines = _DISTRIBUTIONS_FILE.read_text("utf-8").splitlines()
+    rows = (line.split() for line in lines if not line.startswith("#"))
+    return {row[0]: row[-1] for row in rows}
 
 
 def _files_of(folder: Path, name: str) -> list[Path]:

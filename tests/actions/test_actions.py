@@ -271,7 +271,8 @@ def test_an_execution_without_a_final_state_is_aborted(world: World) -> None:
     )
 
 
-def test_on_active_returns_before_on_done(world: World) -> None:
+def test_on_active_returns_before_on_done(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rosz.actions.actionlib_client._ACTIVE_TIMEOUT", TIMEOUT)
     events: list[str] = []
     entered, leave = threading.Event(), threading.Event()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator
 from functools import partial
@@ -20,6 +21,8 @@ from rosz.actions import (
     SimpleActionServer,
     list_actions,
 )
+from rosz.actions.translation import ActionlibToRos2
+from rosz.actions.types import ActionTypes
 from rosz.errors import ActionError, GoalFailed, GoalRejected
 from rosz.introspect.services import list_services
 from rosz.introspect.topics import list_topics
@@ -75,7 +78,8 @@ class World:
 
 
 @pytest.fixture
-def world(network: Network) -> Iterator[World]:
+def world(network: Network, monkeypatch: pytest.MonkeyPatch) -> Iterator[World]:
+    monkeypatch.setattr("rosz.actions.translation._KNOWN_TIMEOUT", TIMEOUT)
     made = World(network)
     yield made
     made.over.set()
@@ -191,10 +195,14 @@ def test_actionlib_executes_a_goal_of_ros2(world: World, end: str, state: GoalSt
 def test_listings_show_only_the_topics_of_ros1(world: World) -> None:
     world.ros1_server()
     world.ros2_client()
-    view = world.one.context.graph.view()
-    assert {topic.name for topic in list_topics(view.tokens) if "fib" in topic.name} == {
-        f"/fib/{part}" for part in ("goal", "cancel", "status", "feedback", "result")
-    }
+    graph = world.one.context.graph
+    topics = {f"/fib/{part}" for part in ("goal", "cancel", "status", "feedback", "result")}
+
+    def listed() -> set[str]:
+        return {one.name for one in list_topics(graph.view().tokens) if "fib" in one.name}
+
+    eventually(lambda: listed() == topics, "the topics")
+    view = graph.view()
     assert not [entry for entry in list_services(view) if "fib" in entry.name]
     assert [(entry.name, entry.servers) for entry in list_actions(view)] == [("/fib", ("/other",))]
 
@@ -337,3 +345,27 @@ def test_a_goal_that_is_sent_twice_is_executed_once(world: World) -> None:
     assert repeat.call(request, TIMEOUT).accepted
     assert world.arrived.empty()
     assert not client.request_cancel(GoalInfo(UUID(sent.id.bytes)), TIMEOUT).goals_canceling
+
+
+def test_goals_may_be_sent_while_others_are_cancelled(world: World) -> None:
+    proxy = ActionlibToRos2(
+        world.one, "/fib", ActionTypes.of(world.action, world.one.context.types), Fibonacci
+    )
+    client = ActionlibClient(world.one, "other", world.action, has_ros2=False)
+    goals = [client.send(world.goal(1)) for _ in range(4000)]
+
+    def send() -> None:
+        for goal in goals:
+            proxy.send(goal, world.goal(1))
+
+    sender = threading.Thread(target=send)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        sender.start()
+        while sender.is_alive():
+            proxy.cancel_all(GoalID(id="of another client"))
+    finally:
+        sys.setswitchinterval(interval)
+        sender.join()
+    assert all(map(proxy.has_sent, goals))

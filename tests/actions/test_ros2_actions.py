@@ -379,7 +379,7 @@ def test_a_server_that_does_not_answer(world: World) -> None:
             pass
     program.kill()
     with pytest.raises(ActionError, match="is lost"):
-        handle.wait(TIMEOUT, silence=2.0)
+        handle.wait(TIMEOUT, silence=TIMEOUT)
 
 
 def test_a_result_is_asked_for_again_when_the_server_answers(

@@ -65,6 +65,23 @@ def test_the_manual_has_the_same_floors() -> None:
     assert written == table
 
 
+def test_the_map_names_places_that_exist() -> None:
+    """In a row, a name stands below ``rosz`` or a folder that the row has named before."""
+    text = (SOURCE / "share/manual/architecture.md").read_text()
+    rows = text.partition("## Where things are")[2].splitlines()
+    missing = []
+    for row in rows:
+        folders = [SOURCE]
+        for name in re.findall(r"`([\w/]+(?:/|\.py|\.txt))`", row):
+            place = next((path for folder in folders if (path := folder / name).exists()), None)
+            if place is None:
+                missing.append(name)
+            else:
+                folders.append(place if place.is_dir() else place.parent)
+    assert len(rows) > 20
+    assert not missing
+
+
 def test_imports_form_no_ring() -> None:
     needs = {
         module: {

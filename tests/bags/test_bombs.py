@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import itertools
+import sqlite3
 import struct
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 import zstandard
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import rosz.bags
 from bags.bombs import CHANNEL, write_bombs
 from rosz.bags import Channel, McapReader, McapWriter
+from rosz.bags.bag import in_order
 from rosz.bags.formats import mcap_records as mcap
+from rosz.bags.formats.chunks import HeldChunks
 from rosz.bags.formats.mcap_records import Op
+from rosz.bags.formats.rosbag2_writer import Rosbag2Writer
 from rosz.errors import BagError, UsageError
 
 SIZE = 768 << 20
@@ -86,6 +94,64 @@ def test_messages_of_a_small_chunk_are_bounded(
         assert "messages" in reader.problems[0].reason
 
 
+def test_messages_of_many_small_chunks_are_bounded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of them would be allowed if it were alone."""
+    monkeypatch.setenv("ROSZ_BAG_LIMIT", "1000000")
+    write_overlapping(tmp_path / "a.mcap", 1000, 0, 20)
+    with McapReader(tmp_path / "a.mcap") as reader:
+        assert 1000 <= reader.count() <= 1000 + reader.size < 10_000
+        assert "too many for the size of the file" in reader.problems[0].reason
+
+
+def test_messages_of_chunks_that_do_not_overlap_are_bounded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("ROSZ_BAG_LIMIT", "1000000")
+    chunks = HeldChunks(7)
+    assert chunks.room(1, 2, 10, 100) == 1007
+    chunks.take(1000)
+    assert chunks.room(3, 4, 10, 100) == 7
+    chunks.take(8)
+    assert chunks.room(5, 6, 10, 100) == 0
+
+
+def test_many_chunks_of_one_time_are_held_at_once() -> None:
+    chunks, begin = HeldChunks(1 << 30), time.process_time()
+    for _ in range(20_000):
+        assert chunks.room(5, 5, 10, 100)
+        chunks.take(1)
+    assert time.process_time() - begin < 4
+
+
+@pytest.mark.parametrize(
+    ("table", "row"),
+    [
+        (
+            "CREATE VIEW Messages AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x FROM c)"
+            " SELECT x AS id, 1 AS topic_id, x AS timestamp, x'00' AS data FROM c",
+            "SELECT 1",
+        ),
+        (
+            "CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER,"
+            " data BLOB AS (zeroblob(900000000)))",
+            "INSERT INTO messages VALUES (1, 1, 5)",
+        ),
+        ("CREATE VIRTUAL TABLE messages USING fts5(id, topic_id, timestamp, data)", "SELECT 1"),
+    ],
+)
+def test_tables_that_are_computed_are_refused(tmp_path: Path, table: str, row: str) -> None:
+    with Rosbag2Writer(tmp_path / "x", storage="sqlite3") as writer:
+        writer.write(writer.add(CHANNEL), 5, b"hello")
+    with sqlite3.connect(tmp_path / "x" / "x_0.db3") as database:
+        for statement in ("DROP TABLE messages", table, row):
+            database.execute(statement)
+    database.close()
+    with pytest.raises(BagError, match="is computed, perhaps without end"):
+        rosz.bags.open_reader(tmp_path / "x")
+
+
 def test_the_limit_can_be_raised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     channel = Channel("/chatter", "std_msgs/msg/String", definition="string data\n")
     with McapWriter(tmp_path / "a.mcap", compression="zstd") as writer:
@@ -102,3 +168,22 @@ def test_the_limit_can_be_raised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("ROSZ_BAG_LIMIT", "much")
     with rosz.bags.open_reader(tmp_path / "a.mcap") as reader, pytest.raises(UsageError):
         list(reader.messages())
+
+
+def test_many_chunks_of_one_time_are_merged_at_once() -> None:
+    begin = time.process_time()
+    spans = [(5, 9, number) for number in range(40_000)]
+    rows = [run for run in in_order(spans, lambda number: [(5, number)], reverse=False) if run]
+    assert time.process_time() - begin < 4
+    assert rows == [[(5, number) for number in range(40_000)]]
+
+
+@settings(max_examples=300)
+@given(st.lists(st.lists(st.integers(0, 30), min_size=1, max_size=9), max_size=8), st.booleans())
+def test_rows_of_spans_that_overlap_are_in_order(stamps: list[list[int]], reverse: bool) -> None:
+    spans, place = [], itertools.count()
+    for span in stamps:
+        rows = [(stamp, next(place)) for stamp in span]
+        spans.append((min(span), max(span), rows))
+    merged = [row for run in in_order(spans, list, reverse=reverse) for row in run]
+    assert merged == sorted((row for *_, rows in spans for row in rows), reverse=reverse)

@@ -13,11 +13,20 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 import rosz.bags
-from rosz.bags import Attachment, Channel, Compression, McapReader, McapWriter
+from rosz.bags import (
+    Attachment,
+    Channel,
+    Compression,
+    McapReader,
+    McapWriter,
+    create_writer,
+    open_reader,
+)
+from rosz.bags.formats.channel_text import parse_profiles
 from rosz.errors import BagError, UsageError
 from rosz.msgs.geometry_msgs.msg import PoseStamped
 from rosz.msgs.std_msgs.msg import String
-from rosz.qos import LATCHED, SENSOR_DATA
+from rosz.qos import LATCHED, SENSOR_DATA, QoS
 
 CHANNELS = [
     Channel("/chatter", "std_msgs/msg/String", definition="string data\n", node="/talker"),
@@ -226,6 +235,36 @@ def test_a_damaged_index_is_named_and_made_anew(tmp_path: Path) -> None:
             f"{path}: its index is damaged: its checksum is wrong"
         ]
         assert len(list(reader.messages())) == len(payloads)
+
+
+def test_a_negative_time_of_a_publisher_is_none(tmp_path: Path) -> None:
+    with McapWriter(tmp_path / "a.mcap") as writer:
+        writer.write(writer.add(CHANNELS[0]), 5, b"kept", -1, -1)
+    with McapReader(tmp_path / "a.mcap") as reader:
+        assert [(one.data, one.sent) for one in reader.messages()] == [(b"kept", 0)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "- " + "[" * 5000,
+        f"- depth: {'9' * 5000}",
+        "- {history: [], durability: {}, depth: [], lifespan: {sec: x, nsec: []}}",
+    ],
+)
+def test_odd_qos_is_that_of_no_publisher(text: str) -> None:
+    assert parse_profiles(text) in {(), (QoS(),)}
+
+
+@pytest.mark.parametrize(("name", "latest"), [("a.bag", (1 << 32) * 10**9), ("a.mcap", 1 << 64)])
+def test_times_that_a_format_cannot_hold(tmp_path: Path, name: str, latest: int) -> None:
+    encoding = "ros1" if name == "a.bag" else "cdr"
+    with create_writer(tmp_path / name) as writer:
+        handle = writer.add(Channel("/a", "std_msgs/msg/String", encoding, md5="0" * 32))
+        for stamp in (-1, 5, (1 << 64) - 1):
+            writer.write(handle, stamp, b"kept")
+    with open_reader(tmp_path / name) as reader:
+        assert [one.stamp for one in reader.messages()] == [0, 5, latest - 1]
 
 
 def test_any_bytes_are_read_or_refused(tmp_path: Path) -> None:

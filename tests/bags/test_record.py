@@ -13,8 +13,10 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +35,13 @@ from rosz.bags.edit.repair import recover
 from rosz.bags.formats.chunk_writer import ChunkWriter
 from rosz.bags.record import BagFiles, ParameterRecord, Recorder, RecordOptions, Ring, Selection
 from rosz.cli.main import run
+from rosz.errors import BagError
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Trigger, TriggerRequest
 from rosz.node import Publisher
 from rosz.qos import LATCHED, QoS
+from rosz.session import Session
+from rosz.typestore import TypeStore
 
 SECOND = 1_000_000_000
 CUSTOM = """
@@ -267,6 +272,47 @@ def test_a_publisher_is_one_channel_from_its_first_message_on(network: Network) 
         talker.join()
 
 
+def test_a_token_that_comes_after_the_first_message(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Messages come as soon as the link does, tokens that existed before may come later."""
+    events: list[Callable[[], object]] = []
+    watch = Session.watch_tokens
+
+    def watch_late(
+        session: Session,
+        key: str,
+        receive: Callable[[str, bool], None],
+        complete: Callable[[], None],
+        **options: Any,
+    ) -> Any:
+        if "/MP/" not in key or "late" not in key:
+            return watch(session, key, receive, complete, **options)
+        return watch(
+            session,
+            key,
+            lambda token, alive: events.append(partial(receive, token, alive)),
+            lambda: events.append(complete),
+            **options,
+        )
+
+    publisher = network.node("talker").publisher("/late", String)
+    monkeypatch.setattr("rosz.graph.interests.COMPLETE_BY", TIMEOUT)
+    monkeypatch.setattr(Session, "watch_tokens", watch_late)
+    with recording(network, "a.mcap", "/late") as made:
+
+        def has_come() -> bool:
+            publisher.publish(String(data="a"))
+            return "/late" in made.recorder._publishers.topics and bool(events)
+
+        eventually(has_come)
+        for event in events:
+            event()
+        made.wait_for_count(1)
+    with open_reader(made.files.done[0]) as reader:
+        assert "/talker" in {channel.node for channel in reader.channels}
+
+
 def test_each_split_begins_with_latched_messages_and_parameters(network: Network) -> None:
     node = network.node("talker")
     node.params.set("/gain", 5)
@@ -409,6 +455,27 @@ def numbers_in(path: Path) -> list[int]:
         return []
     with rosz_bag(path) as bag:
         return [int(entry.message.data) for entry in bag.messages("/chatter")]
+
+
+def test_a_further_bag_that_cannot_be_created(tmp_path: Path) -> None:
+    options = RecordOptions(name=str(tmp_path / "x.mcap"), split=True, size=1000)
+    files = BagFiles(options, list[str]().append)
+    track = files.track(Channel("/data", "std_msgs/msg/String", "cdr", "string data"), TypeStore())
+    first = files.path
+    taken = options.target(1, datetime.now().astimezone())
+    taken.touch()
+    with pytest.raises(BagError, match=f"^{taken}: it exists already"):
+        files.write(track, 1, bytes(2000), None, 0)
+    files.close()
+    assert (files.count, files.unwritten, files.done) == (1, 0, [first])
+    assert files.size == first.stat().st_size
+
+
+def test_a_bag_that_cannot_be_renamed(tmp_path: Path) -> None:
+    files = BagFiles(RecordOptions(name=str(tmp_path / "x.mcap")), list[str]().append)
+    (tmp_path / "x.mcap.active").unlink()
+    with pytest.raises(BagError, match=r"x.mcap.active: cannot rename it to '.*x.mcap': No such"):
+        files.close()
 
 
 def test_a_full_disk(network: Network) -> None:
@@ -653,7 +720,11 @@ def test_what_was_published_before_is_recorded_only_if_it_was_latched(network: N
             assert [one.message.data for one in bag.messages(topic)] == ["4"], topic
 
 
-def test_topics_that_were_not_followed_in_time_count_as_lost(network: Network) -> None:
+def test_topics_that_were_not_followed_in_time_count_as_lost(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("_SETTLE_SECONDS", "_LOOK_SECONDS"):
+        monkeypatch.setattr(f"rosz.bags.record.recorder.{name}", TIMEOUT)
     node = network.node("talker")
     for number in range(3):
         node.publisher(f"/t{number}", String)

@@ -104,7 +104,8 @@ def test_the_rest_of_a_damaged_bag_is_recovered(
     data[chunk.offset + 300] ^= 4
     path.write_bytes(data)
 
-    count, problems = check_bag(path)
+    with open_reader(path) as reader:
+        count, problems = check_bag(reader)
     assert [one.offset for one in problems] == [chunk.offset]
     assert run(["bag", "check", str(path)]) == 1
     assert f"ERROR: {path} at byte {chunk.offset}: the checksum" in capsys.readouterr().err
@@ -127,7 +128,8 @@ def test_a_bag_cut_anywhere_is_recovered_up_to_there(tmp_path: Path) -> None:
         path.write_bytes(whole[:size])
         copied = recover(path, tmp_path / f"{size}.mcap")
         counts.append(copied.count)
-        assert check_bag(copied.path) == (copied.count, [])
+        with open_reader(copied.path) as reader:
+            assert check_bag(reader) == (copied.count, [])
     assert counts == sorted(counts)
     assert counts[-1] == COUNT
 
@@ -186,7 +188,8 @@ def test_what_is_left_of_a_bag_for_which_there_is_no_room(tmp_path: Path) -> Non
     )
     assert {one.name for one in tmp_path.iterdir()} == {"a.mcap", "d"}
     assert (tmp_path / "a.mcap").read_bytes() == begun
-    count, _ = check_bag(tmp_path / "d")
+    with open_reader(tmp_path / "d") as reader:
+        count, _ = check_bag(reader)
     assert 0 < count < COUNT
 
 

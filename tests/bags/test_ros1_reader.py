@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 import random
+import time
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from rosbags.rosbag1 import Reader
 
+from rosz.bags import Channel, create_writer, open_reader
+from rosz.bags.formats import ros1_records
 from rosz.bags.formats.ros1_reader import Ros1Reader
+from rosz.bags.summary import summarize
 from rosz.errors import BagError
 
 from .ros1_files import STORE, write_bag
@@ -49,7 +54,8 @@ def test_a_bag_reads_as_other_libraries_read_it(tmp_path: Path, compression: str
         )
         assert (chatter.latched, point.latched) == (False, True)
         assert ours.count(point) == COUNT
-        assert ours.stamps(point) == [stamp for topic, stamp, _ in expected if topic == "/point"]
+        stamps = sorted((stamp, channel.topic) for channel, stamp in ours.stamps())
+        assert stamps == [(stamp, topic) for topic, stamp, _ in expected]
 
 
 def test_ranges_topics_and_reverse(tmp_path: Path) -> None:
@@ -146,3 +152,49 @@ def test_what_is_no_bag_is_named(tmp_path: Path, content: bytes, reason: str) ->
     with pytest.raises(BagError) as caught:
         Ros1Reader(path)
     assert str(caught.value).startswith(f"{path} at byte 0: {reason}")
+
+
+@pytest.mark.parametrize("field", [b"index_pos=", b"chunk_pos="])
+def test_a_place_beyond_all_files_is_damage(tmp_path: Path, field: bytes) -> None:
+    path = write_bag(tmp_path / "x.bag", _messages())
+    data = bytearray(path.read_bytes())
+    begin = data.index(field) + len(field)
+    data[begin : begin + 8] = b"\xff" * 8
+    path.write_bytes(data)
+    messages, problems = _read(path)
+    assert len(messages) in {0, 2 * COUNT}
+    assert "ends" in problems[0] or "expected" in problems[0]
+
+
+def test_a_number_of_many_bytes_is_none() -> None:
+    with pytest.raises(ros1_records.RecordError, match="without a number in its field 'count'"):
+        ros1_records.number({"count": b"\xff" * 9}, "count", 0)
+
+
+def test_what_looks_like_many_chunks_is_searched_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_bag(tmp_path / "x.bag", _messages())
+    whole = path.read_bytes()
+    begin = whole.index(b"compression=") - 40
+    path.write_bytes(whole[:begin] + b"\xff" * 100 + b"compression=" * 2000 + whole[begin:])
+    pread = Mock(side_effect=os.pread)
+    monkeypatch.setattr(os, "pread", pread)
+    messages, problems = _read(path)
+    assert len(messages) == 2 * COUNT
+    assert problems
+    assert pread.call_count < 1000
+
+
+@pytest.mark.parametrize("name", ["x.bag", "x.mcap"])
+def test_many_channels_are_counted_at_once(tmp_path: Path, name: str) -> None:
+    encoding, count = ("ros1" if name == "x.bag" else "cdr"), 20_000
+    with create_writer(tmp_path / name) as writer:
+        for number in range(count):
+            channel = Channel(f"/t{number}", "std_msgs/msg/Empty", encoding, md5="0" * 32)
+            writer.write(writer.add(channel), START, b"")
+    begin = time.process_time()
+    with open_reader(tmp_path / name) as reader:
+        topics = summarize(name, reader).topics
+    assert [topic.messages for topic in topics] == [1] * count
+    assert time.process_time() - begin < 8

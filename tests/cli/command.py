@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from network import free_port
@@ -38,6 +39,15 @@ def rosz(
         timeout=300,
         check=False,
     )
+
+
+def read_all(screen: int) -> bytes:
+    """Return what is written to a terminal until its other side is closed, and close this one."""
+    written = b""
+    with os.fdopen(screen, "rb", buffering=0) as file, suppress(OSError):  # raised at the end
+        while more := file.read(65536):
+            written += more
+    return written
 
 
 def package(folder: Path, name: str, **scripts: str) -> Path:

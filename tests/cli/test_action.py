@@ -1,12 +1,11 @@
 from __future__ import annotations
 
 import signal
-import threading
 from pathlib import Path
 from typing import Any
 
 import pytest
-from network import TIMEOUT, Network
+from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.node import Node
@@ -102,10 +101,11 @@ def test_interrupt_cancels_the_goal(shell: Shell) -> None:
     assert program.exit_code() == 1
 
 
-def test_waiting_for_a_server(shell: Shell, network: Network) -> None:
+def test_waiting_for_a_server(shell: Shell, network: Network, server: Node) -> None:
     late = network.node("late")
+    eventually(lambda: len(server.context.session.links()) == 1, "the link to the other node")
     program = shell.start("action", "send", "--wait", "/late", "1")
-    threading.Event().wait(0)
+    eventually(lambda: len(server.context.session.links()) > 1, "the link to the command")
     late.action_server("/late", Fibonacci, execute)
     program.wait_for("goal succeeded")
     assert program.exit_code() == 0

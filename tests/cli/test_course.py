@@ -6,7 +6,7 @@ from network import Network
 
 from .test_env import evaluate
 
-UNTIL = "timeout 30 sh -c 'until {} 2>/dev/null | grep -q {}; do :; done'"
+UNTIL = "timeout 200 sh -c 'until {} 2>/dev/null | grep -q {}; do :; done'"
 
 
 def test_turtles_and_parameters(network: Network) -> None:
@@ -34,13 +34,13 @@ def test_turtles_and_parameters(network: Network) -> None:
         "grep -c our_own_param 1122.yaml",
         "rosparam delete /our_own_param",
         "rosparam get /our_own_param",
-        "timeout 30 rostopic pub -1 /turtle1/cmd_vel geometry_msgs/Twist"
+        "timeout 200 rostopic pub -1 /turtle1/cmd_vel geometry_msgs/Twist"
         " -- '[2.0, 0.0, 0.0]' '[0.0, 0.0, -1.8]'",
-        "timeout 30 rostopic echo -n 1 /turtle1/pose | grep -c theta",
+        "timeout 200 rostopic echo -n 1 /turtle1/pose | grep -c theta",
         "rosmsg show turtlesim/Pose",
         "kill %1 %2",
         "wait",
-        timeout=300,
+        timeout=500,
     )
     out = done.stdout.splitlines()
     assert out[0] == "turtlesim/Spawn", (done.stdout, done.stderr)

@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
+from pathlib import Path
+
+import pytest
+from doctor.conftest import be_patient
 from network import Network
 
+from rosz.doctor import Examination
 from rosz.msgs.std_msgs.msg import Int32, String
 
 from .shell import Shell
+
+
+@pytest.fixture(autouse=True)
+def _doctor(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A doctor who waits for a busy machine, and does not look at its shared memory."""
+    be_patient(monkeypatch)
+    monkeypatch.setattr("rosz.doctor.Examination", partial(Examination, memory=tmp_path))
 
 
 def test_a_healthy_system(shell: Shell, network: Network) -> None:

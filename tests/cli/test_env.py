@@ -18,7 +18,7 @@ ENV = f"{sys.executable} -P -m rosz env"
 
 
 def evaluate(
-    network: Network, shell: str, *lines: str, timeout: float = 40
+    network: Network, shell: str, *lines: str, timeout: float = 300
 ) -> subprocess.CompletedProcess[str]:
     """Run lines in a shell that has evaluated what rosz prints for it."""
     if shutil.which(shell) is None:
@@ -63,7 +63,7 @@ def test_ros_1_names_mean_rosz(network: Network, shell: str) -> None:
         network,
         shell,
         "rosnode list",
-        "timeout 30 rostopic list",
+        "timeout 300 rostopic list",
         "rosmsg show std_msgs/Bool",
         "roscd std_msgs/msg && pwd",
         "rosls std_msgs/msg | grep -x Bool.msg",
@@ -128,12 +128,31 @@ def test_a_sitecustomize_of_the_user_runs_as_well(network: Network) -> None:
     assert evaluate(network, "bash", line).stdout == "mine\n/unnamed\n"
 
 
+def test_two_installations_of_rosz_on_the_path(network: Network) -> None:
+    shutil.copytree(BIN.parents[1] / "ros1" / "shell", network.folder / "b")
+    (network.folder / "sitecustomize.py").write_text("print('mine')\n")
+    line = (
+        'PYTHONPATH="$PYTHONPATH:b:$PYTHONPATH:." "$ROSZ_PYTHON" -c'
+        ' "import rospy; print(rospy.get_name())"'
+    )
+    done = evaluate(network, "bash", line)
+    assert (done.stdout, done.stderr) == ("mine\n/unnamed\n", "")
+
+
 def test_ctrl_c_before_a_command_or_script_begins(network: Network) -> None:
     press = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n"
     (network.folder / "sitecustomize.py").write_text(press)
     for line in ('"$ROSZ_PYTHON" -c "import rospy"', "rostopic list"):
         done = evaluate(network, "bash", f'PYTHONPATH="$PYTHONPATH:." {line}; echo $?')
         assert (done.stdout, done.stderr) == ("130\n", "")
+
+
+def test_ctrl_c_while_the_script_of_the_command_imports(network: Network) -> None:
+    (network.folder / "bin").mkdir()
+    press = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nprint('goes on')\n"
+    (network.folder / "bin" / "rosz").write_text(press)
+    done = evaluate(network, "bash", '"$ROSZ_PYTHON" ./bin/rosz; echo $?')
+    assert (done.stdout, done.stderr) == ("130\n", "")
 
 
 @pytest.mark.parametrize("module", ["rosz.interrupts", "rosz.ros1.importer", "rosz.node"])

@@ -140,7 +140,7 @@ def test_wait_for_on_the_live_graph(launch: Start, network: Network) -> None:
     file.write_text(
         "<launch>"
         '<node pkg="demo" type="done" name="late" required="true"'
-        ' wait_for="topic /chatter, node /talker, param /go" wait_timeout="20"/>'
+        ' wait_for="topic /chatter, node /talker, param /go" wait_timeout="300"/>'
         '<node pkg="demo" type="talker" name="talker" spawn_delay="0.3"/>'
         "</launch>"
     )

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from interop.ros2_node import Ros2Node, ros2_node
 from network import eventually
 from oracle import Worker, require
 from params.network import Network
@@ -23,9 +24,10 @@ from rosz.cli.main import run
 from rosz.cli.param import _format_scalar, _parse_scalar
 from rosz.node import Node
 from rosz.params.replica import Replica
+from rosz.params.wire import Keys, ReplicaMember
 from rosz.params.yaml import format_get, load, pretty
 
-from .command import ROSZ, environ
+from .command import ROSZ, environ, read_all
 
 Command = Callable[..., tuple[int, str, str]]
 
@@ -324,6 +326,32 @@ def test_dump_to_what_is_no_file(replica: Replica, tmp_path: Path, target: str) 
     assert (done.stdout, done.stderr) == ("a: 1\n", "")
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_terminal_shows_how_far_a_load_is(
+    network: Network, replica: Replica, tmp_path: Path, *, terminal: bool
+) -> None:
+    """One that looks like a replica and never answers makes the load take its limit of 2 s."""
+    silent = ReplicaMember(1, "0badc0de", "a silent program")
+    network.keep(network.session().token(Keys(0).token(silent)))
+    eventually(lambda: silent in replica.members())
+    ours, theirs = os.openpty() if terminal else os.pipe()
+    subprocess.run(
+        [*ROSZ, "param", "load", "-"],
+        input=b"a: 1",
+        env=environ(tmp_path, ROSZ_RENDEZVOUS=os.environ["ROSZ_RENDEZVOUS"]),
+        cwd=tmp_path,
+        stderr=theirs,
+        timeout=300,
+        check=True,
+    )
+    os.close(theirs)
+    text = read_all(ours).decode()
+    line = "loading 1 parameter, known to 1 replica, waiting for a silent program ("
+    assert (f"\r\033[K{line}" in text) == terminal
+    warning = "WARNING: written, but not yet known to a silent program, which did not answer"
+    assert text.endswith(f"\r\033[K{warning}\r\n" if terminal else f"{warning}\n")
+
+
 def test_searching(replica: Replica, param: Command) -> None:
     replica.set("/robot/description", "urdf")
     assert param("search", "description", "/robot/arm/node") == (0, "/robot/description\n", "")
@@ -410,7 +438,7 @@ def test_watching_in_a_process_of_its_own(
     replica.set("/other", 1)
     replica.delete("/ns/a")
     replica.set("/ns/c", [1])
-    out, err = watcher.communicate(timeout=60)
+    out, err = watcher.communicate(timeout=300)
     assert out == '~ /ns/a: 1 -> 2\n+ /ns/b: "two\\nlines"\n- /ns/a: 2\n+ /ns/c: [1]\n'
     assert (watcher.returncode, err) == (0, "")
 
@@ -523,7 +551,9 @@ def test_parameters_of_nodes_that_are_gone(
         for name in ("/root", "/alive/rate", "/alive/pid/p", "/alive2/rate", "/gone/pid/p"):
             replica.set(name, 1)
         replica.set("/robot/gone/rate", 2)
-        left = ["/alive2/rate", "/gone/pid/p", "/robot/gone/rate"]
+        replica.set("/emptied/pid/p", 3)
+        replica.delete("/emptied/pid/p")
+        left = ["/alive2/rate", "/emptied/pid/", "/gone/pid/p", "/robot/gone/rate"]
 
         def listed() -> list[str]:
             code, out, err = param("list", "--gone")
@@ -535,24 +565,43 @@ def test_parameters_of_nodes_that_are_gone(
 
         code, _, err = param("delete", "--gone")
         assert code == 2
-        assert "3 parameters would be deleted" in err
+        assert "4 parameters would be deleted" in err
         monkeypatch.setattr(io, "TextIOWrapper", Terminal)
         code, out, err = param("delete", "--gone", stdin="no\n")
         assert (code, out.split()) == (1, left)
-        assert "Delete these 3 parameters? [y/N] nothing is deleted" in err
+        assert "Delete these 4 parameters? [y/N] nothing is deleted" in err
         assert listed() == left
         code, out, err = param("delete", "--gone", "/robot", stdin="y\n")
-        assert (code, out.split()) == (0, left[2:])
-        assert listed() == left[:2]
+        assert (code, out.split()) == (0, left[3:])
+        assert listed() == left[:3]
         code, out, err = param("delete", "--gone", "-y", "-v")
         assert (code, err) == (0, "")
-        assert out.splitlines() == [f"deleted parameter [{name}]" for name in left[:2]]
-        assert listed() == []
-        for name in ("/root", "/alive/rate", "/alive/pid/p"):
-            assert replica.get(name) == 1
+        assert out.splitlines() == [f"deleted parameter [{name}]" for name in left[:3]]
+        assert param("list", "--gone") == (0, "", "")
+        tree = replica.get("/")
+        assert isinstance(tree, dict)
+        assert tree["alive"] == {"rate": 1, "pid": {"p": 1}}
+        # No namespace stays, whose deletions would be remembered for good.
+        assert tree.keys().isdisjoint({"alive2", "emptied", "gone", "robot"})
     finally:
         node.close()
         node.context.close()
+
+
+def test_what_is_set_while_the_user_is_asked_is_not_deleted(
+    replica: Replica, param: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Slow(Terminal):
+        def readline(self, *_: object) -> str:  # type: ignore[override]  # of a text
+            replica.set("/gone/new", 2)
+            return "y\n"
+
+    replica.set("/gone/rate", 1)
+    replica.set("/gone/pid/p", 1)
+    monkeypatch.setattr(io, "TextIOWrapper", Slow)
+    code, out, _ = param("delete", "--gone")
+    assert (code, out.split()) == (0, ["/gone/pid/p", "/gone/rate"])
+    assert replica.get("/gone") == {"new": 2}
 
 
 @pytest.mark.parametrize("line", ["delete", "delete /x -y"])
@@ -560,3 +609,33 @@ def test_what_is_to_be_deleted_must_be_clear(param: Command, line: str) -> None:
     code, out, err = param(*line.split())
     assert (code, out) == (2, "")
     assert "--gone" in err
+
+
+@pytest.fixture
+def ros2(network: Network, replica: Replica) -> Iterator[Ros2Node]:  # noqa: ARG001  # there before
+    with ros2_node(network.rendezvous, network.domain, "arm", speed=1.5, gains__p=2) as node:
+        node.read_only.add("gains.p")
+        yield node
+
+
+def test_parameters_of_a_node_of_ros2(param: Command, ros2: Ros2Node, tmp_path: Path) -> None:
+    """All commands reach them as those of the store."""
+    eventually(lambda: param("list") == (0, "/arm/gains/p\n/arm/speed\n", ""), "the node")
+    assert param("get", "/arm/gains") == (0, "p: 2\n\n", "")
+    assert param("set", "/arm/speed", "3") == (0, "", "")
+    assert ros2.get("speed") == 3.0
+    assert param("dump", "arm.yaml", "/arm") == (0, "", "")
+    assert (tmp_path / "arm.yaml").read_text() == "gains:\n  p: 2\nspeed: 3.0\n"
+    assert param("set", "/arm/speed", "4") == (0, "", "")
+    code, out, err = param("load", "arm.yaml", "/arm", "--dry-run")
+    assert (code, out) == (0, "~ /arm/speed: 4.0 -> 3.0\n")
+    assert param("load", "arm.yaml", "/arm") == (0, "", "")
+    assert ros2.get("speed") == 3.0
+    code, out, err = param("set", "/arm/gains/p", "5")
+    assert (code, out) == (1, "")
+    assert "'gains.p' cannot be set because it is read-only" in err
+    code, out, err = param("delete", "/arm/speed")
+    assert (code, out) == (1, "")
+    assert "node '/arm' refuses to set '/arm/speed'" in err
+    assert param("set", "/other", "1") == (0, "", "")
+    assert param("get", "/") == (0, "arm:\n  gains:\n    p: 2\n  speed: 3.0\nother: 1\n\n", "")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from network import Network
 
-from .command import ROSZ, environ, rosz
+from .command import ROSZ, environ, read_all, rosz
 from .test_env import evaluate
 
 
@@ -59,8 +59,8 @@ def test_the_steps_of_a_course(network: Network, shell: str) -> None:
         "roscd beginner_tutorials/scripts && pwd",
         "rosls beginner_tutorials",
         "rosmsg show beginner_tutorials/Number",
-        "timeout 30 rosrun beginner_tutorials talker.py _rate:=100 &",
-        "timeout 60 sh -c 'until rostopic list 2>/dev/null | grep -q /numbers; do :; done'",
+        "timeout 300 rosrun beginner_tutorials talker.py _rate:=100 &",
+        "timeout 200 sh -c 'until rostopic list 2>/dev/null | grep -q /numbers; do :; done'",
         "rostopic echo -n 1 /numbers",
         "rosnode kill /talker",
         timeout=300,
@@ -90,9 +90,8 @@ def test_a_dumb_terminal_gets_no_escapes(tmp_path: Path, kind: str, *, escapes: 
         stderr=theirs,
         check=False,
     )
-    written = os.read(ours, 65536).decode()
-    for end in (ours, theirs):
-        os.close(end)
+    os.close(theirs)
+    written = read_all(ours).decode()
     assert done.returncode == 1
     assert "Odd.msg:1:1: " in written
     assert ("\033[" in written) == escapes

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import os
 import pty
-import select
 import signal
 import subprocess
 import sys
 import threading
 
 import pytest
-from network import Network, Program, eventually, repeats
+from network import TIMEOUT, Network, Program, eventually, repeats
 
 from rosz.cli.commands import load
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import Node
 
+from .command import read_all
 from .shell import Shell
 
 ROBOT = """
@@ -156,7 +156,9 @@ def test_ctrl_c_never_prints_a_traceback(network: Network, talker: Node, line: s
         network = Network()
     try:
         for moment in range(repeats(4, 40)):
-            program = network.program(BEGUN, *line.split())
+            # Not with warnings as errors: an import that is interrupted leaves its file to be
+            # closed with a warning, which Python would print with a traceback.
+            program = network.program(BEGUN, *line.split(), PYTHONWARNINGS="")
             program.wait_for("begun")
             # Wherever it stands just then: anywhere from its imports to its work.
             threading.Event().wait(0.4 * moment / repeats(4, 40))
@@ -269,7 +271,10 @@ ENDING = """
     from rosz.cli import main
     atexit.register(print, "at the exit")
     if sys.argv.pop(1) == "busy":
-        threading.Timer(0.2, print, ["the thread"]).start()
+        def end():
+            threading.main_thread().join()
+            print("the thread")
+        threading.Thread(target=end).start()
     main.main()
     """
 
@@ -297,15 +302,9 @@ def on_terminal(network: Network, *words: str, **variables: str) -> bytes:
         stderr=theirs,
     ) as process:
         os.close(theirs)
-        said = b""
-        while select.select([ours], [], [], 30)[0]:
-            try:
-                said += os.read(ours, 4096)
-            except OSError:  # the other end is closed
-                break
-        process.wait(60)
-    os.close(ours)
-    return said
+        written = read_all(ours)
+        process.wait(TIMEOUT)
+    return written
 
 
 @pytest.mark.parametrize("words", [["doctor"], ["log", "-n", "1"], ["pkg", "check", "odd"]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import struct
 import threading
@@ -21,6 +22,7 @@ from rosz.wire import entity_key, pack_attachment
 from .conftest import Doctor
 from .test_tokens import stranger
 
+Sample = Callable[[Callable[[], bytes]], None]
 NODE = """
     import sys
     import rosz
@@ -77,7 +79,7 @@ def test_a_node_that_hangs(doctor: Doctor, network: Network) -> None:
     program = start(network, "stopped")
     stop(program)
     try:
-        found = doctor()
+        found = doctor(somebody_hangs=True)
     finally:
         program.send(signal.SIGCONT)
     assert found["unreachable-node"].level == "error"
@@ -102,9 +104,9 @@ def test_who_holds_the_meeting_point_is_stopped(doctor: Doctor, network: Network
     program = start(network, "stopped")
     stop(program)
     try:
-        alone = doctor()
+        alone = doctor(somebody_hangs=True)
         start(network, "newcomer")
-        found = doctor()
+        found = doctor(somebody_hangs=True)
     finally:
         program.send(signal.SIGCONT)
     assert list(alone) == ["stopped-process", "nobody-there"]
@@ -167,22 +169,23 @@ def test_a_clock_that_is_off(doctor: Doctor, network: Network) -> None:
     finding = doctor()["clock-offset"]
     (line,) = finding.evidence
     assert line.startswith("/early (")
-    assert "30.0" in line or "29.9" in line
-    assert "s ahead of the one here" in line
+    seconds = re.search(r"([\d.]+) s ahead of the one here", line)
+    assert seconds is not None
+    assert 20 < float(seconds[1]) < 40  # it is off by half the time of a slow answer
 
 
 @pytest.fixture
-def sample(network: Network) -> Callable[[bytes], None]:
+def sample(network: Network) -> Sample:
     """Have a ROS 2 node send samples with an attachment, as long as the test goes on."""
 
-    def send(attachment: bytes) -> None:
+    def send(attach: Callable[[], bytes]) -> None:
         session = stranger(network)
         key = entity_key(network.domain, "/scan", "std_msgs/msg/String", String._type_hash)
         stop = threading.Event()
 
         def run() -> None:
             while not stop.wait(0.02) and not session.closed:
-                session.put(key, b"\0\1\0\0\1\0\0\0\0", attachment=attachment)
+                session.put(key, b"\0\1\0\0\1\0\0\0\0", attachment=attach())
 
         class Stop:
             def close(self) -> None:
@@ -196,22 +199,22 @@ def sample(network: Network) -> Callable[[bytes], None]:
     return send
 
 
-def test_stamps_of_a_clock_that_is_off(doctor: Doctor, sample: Callable[[bytes], None]) -> None:
-    sample(pack_attachment(1, time.time_ns() - 60_000_000_000, bytes(16)))
+def test_stamps_of_a_clock_that_is_off(doctor: Doctor, sample: Sample) -> None:
+    sample(lambda: pack_attachment(1, time.time_ns() - 60_000_000_000, bytes(16)))
     finding = doctor(listen=15.0)["clock-offset"]
     (line,) = finding.evidence
     assert line.startswith("/stranger (")
     assert "s behind the clock here" in line
 
 
-def test_samples_of_an_older_release(doctor: Doctor, sample: Callable[[bytes], None]) -> None:
-    sample(bytes(77))
+def test_samples_of_an_older_release(doctor: Doctor, sample: Sample) -> None:
+    sample(lambda: bytes(77))
     finding = doctor(listen=15.0)["old-rmw-zenoh"]
     assert "rmw_zenoh before 0.2.5" in finding.evidence[0]
 
 
-def test_good_stamps(doctor: Doctor, sample: Callable[[bytes], None]) -> None:
-    sample(pack_attachment(1, time.time_ns(), bytes(16)))
+def test_good_stamps(doctor: Doctor, sample: Sample) -> None:
+    sample(lambda: pack_attachment(1, time.time_ns(), bytes(16)))
     assert set(doctor(listen=0.5)) == {"no-subscriber"}
 
 

@@ -37,6 +37,11 @@ def wait_until_gone(graph: Graph, name: str) -> float:
     return time.monotonic()
 
 
+def wait_until_back(graph: Graph, name: str) -> None:
+    """Wait until the observer, too, sees the next life of a node."""
+    graph.wait_for(lambda view: name in view.nodes(), TIMEOUT, f"the next life of {name}")
+
+
 def test_each_dies_and_comes_back(network: Network) -> None:
     """Nobody is special: whoever dies, all others go on, and its next life joins them."""
     programs = [start(network, number, 0) for number in range(COUNT)]
@@ -63,6 +68,7 @@ def test_each_dies_and_comes_back(network: Network) -> None:
         programs[before].wait_for(f"heard {number}.1")
         programs[number].wait_for(f"heard {(number + 1) % COUNT}.")
         back.append(time.monotonic() - began)
+        wait_until_back(graph, name)
         assert len(observer.params.get("/alive")) == COUNT
     print(f"\nkill -9 to gone from the graph: {max(gone):.2f} s at most of {COUNT}")
     print(f"start of its next life to heard by a neighbour: {max(back):.2f} s at most")

@@ -90,18 +90,29 @@ class Link:
         """Cut it so that the host sees that there is no carrier."""
         self._switch.run("ip", "link", "set", self._port, "down")
 
-    def degrade(self, *, delay: float = 0.0, loss: float = 0.0, rate: float = 0.0) -> None:
+    def degrade(
+        self,
+        *,
+        delay: float = 0.0,
+        loss: float = 0.0,
+        rate: float = 0.0,
+        duplicate: float = 0.0,
+        reorder: float = 0.0,
+    ) -> None:
         """Make it bad, both ways, until it is healed.
 
         Args:
             delay: Seconds that each packet takes longer.
             loss: Share of packets that get lost, 0 to 1.
             rate: Bytes per second at most; 0 for no limit.
+            duplicate: Share of packets that come twice, 0 to 1.
+            reorder: Share of packets that later ones overtake, 0 to 1.
         """
         self._replug()
         script = Path(__file__).with_name("wire.py")
         names = (f"w{self._port}", f"t{self._port}")
-        command = [sys.executable, "-I", "-S", str(script), *names, *map(str, (delay, loss, rate))]
+        numbers = map(str, (delay, loss, rate, duplicate, reorder))
+        command = [sys.executable, "-I", "-S", str(script), *names, *numbers]
         self._wire = subprocess.Popen(
             self._switch.inside(command), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )

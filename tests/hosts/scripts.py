@@ -59,7 +59,7 @@ _START = 0.25
 def first_messages(host: Host, **variables: str) -> list[float]:
     """Return how long a new node takes to hear something, in seconds from its start, sorted."""
     seconds = []
-    for _ in range(repeats(5, 40)):
+    for _ in range(repeats(3, 40)):
         began = time.monotonic()
         listener = host.program(LISTENER, "listener", "once", **variables)
         listener.wait_for("heard")

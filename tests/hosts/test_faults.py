@@ -16,8 +16,11 @@ from hosts.world import World
 LISTEN = "tcp/0.0.0.0:7447"
 AGAIN_BY = 5.0
 """Seconds after which all is as it was when a link has been healed."""
-_KEEP_ALIVE = 2.1
-"""Seconds in which a link that carries nothing else carries a message of Zenoh each way."""
+_LEASE = 6.0
+"""Seconds after the last message of a link at which Zenoh gives it up, where a test says so. TCP by
+itself tries again 3 s after a cut, and then after 6.2 s and 12.6 s."""
+_KEEP_ALIVE = _LEASE / 4 + 0.1
+"""Seconds in which such a link that carries nothing else carries a message of Zenoh each way."""
 
 
 def start_core(host: Host, *options: str) -> HostProgram:
@@ -32,10 +35,13 @@ class Pair:
     Args:
         world: Where.
         linked: How the laptop is linked: by a ``core`` of its own, or by each of its ``nodes``.
+        variables: Environment of all programs.
     """
 
-    def __init__(self, world: World, linked: str) -> None:
+    def __init__(self, world: World, linked: str, **variables: str) -> None:
         self.robot, self.laptop = world.hosts("robot", "laptop")
+        for host in (self.robot, self.laptop):
+            host.variables |= variables
         self.core = start_core(self.robot, "--listen", LISTEN)
         if linked == "core":
             start_core(self.laptop, "--connect", "tcp/robot:7447")
@@ -130,16 +136,17 @@ def test_a_link_is_cut_and_healed(world: World, linked: str, seconds: float) -> 
 @pytest.mark.parametrize("linked", ["core", "nodes"])
 def test_a_link_that_was_just_given_up_holds_up_nothing(world: World, linked: str) -> None:
     """Its connection has things to send still, which is no reason to wait for it."""
-    pair = Pair(world, linked)
+    pair = Pair(world, linked, ZENOH_CONFIG_OVERRIDE=f"transport/link/tx/lease={_LEASE * 1000:g}")
     seconds = []
-    for _ in range(repeats(2, 10)):
+    for number in range(repeats(1, 10)):
+        if number:
+            time.sleep(_KEEP_ALIVE)  # each side hears the other, so that the next cut is a new one
         pair.laptop.link.cut()
-        time.sleep(8.6)  # Zenoh has given up the link 8 s after the last message
+        time.sleep(_LEASE + 0.6)
         healed = time.monotonic()
         pair.laptop.link.heal()
         seconds.append(pair.hears_again(100, healed))
-        time.sleep(_KEEP_ALIVE)  # each side hears the other, so that the next cut is a new one
-    print(f"link cut for 8.6 s, linked by {linked}: topics after {max(seconds):.2f} s at most")
+    print(f"link cut and given up, linked by {linked}: topics after {max(seconds):.2f} s at most")
     assert max(seconds) < 3 * slack()
 
 
@@ -170,7 +177,7 @@ def test_the_router_is_killed_and_started_again(world: World, linked: str) -> No
     before = len(pair.listener.lines)
     pair.core = start_core(pair.robot, "--listen", LISTEN)
     began = time.monotonic()
-    pair.listener.wait_for("heard", 30, after=before + 5)
+    pair.listener.wait_for("heard", after=before + 5)
     topics = time.monotonic() - began
     set_both(pair)
     params = pair.agree(100, began, mine=1, yours=2, same=3)
@@ -189,7 +196,7 @@ from rosz.msgs.std_msgs.msg import String
 with rosz.Node("fast") as node:
     topic = node.publisher("fast", String, queue_size=10)
     message = String(data="x" * 1000)
-    topic.wait_for_subscribers(2, timeout=10)
+    topic.wait_for_subscribers(2, timeout=60)
     print("ready", flush=True)
     for line in sys.stdin:
         count, slowest, total, due = int(line), 0.0, 0.0, time.perf_counter()
@@ -226,7 +233,7 @@ def sent(fast: HostProgram, count: int) -> tuple[float, float, int]:
 
     before = len(fast.lines)
     fast.say(str(count))
-    mean, worst, memory = json.loads(fast.wait_for("sent", 40, after=before).partition(" ")[2])
+    mean, worst, memory = json.loads(fast.wait_for("sent", after=before).partition(" ")[2])
     return mean, worst, memory
 
 

@@ -1,11 +1,11 @@
-"""Histories of faults between three machines; ``hosts.histories`` plays more of them."""
+"""Histories of faults between machines; ``hosts.histories`` plays more of them."""
 
 from __future__ import annotations
 
 import pytest
 from network import repeats
 
-from hosts.histories.history import CHAIN, MESH, Action, History
+from hosts.histories.history import HOSTS, Action, History, chain, mesh
 from hosts.histories.play import play
 from hosts.scripts import slack
 from hosts.world import why_not
@@ -21,7 +21,7 @@ def _namespaces() -> None:
 
 
 @pytest.mark.timeout(600 * repeats(1, 11))
-@pytest.mark.parametrize("neighbours", [MESH, CHAIN], ids=["mesh", "chain"])
+@pytest.mark.parametrize("neighbours", [mesh(HOSTS), chain(HOSTS)], ids=["mesh", "chain"])
 @pytest.mark.parametrize("what", ["core", "node"])
 def test_who_stood_still_is_back_soon(neighbours: dict[str, str], what: str) -> None:
     for _ in range(repeats(1, 11)):
@@ -35,7 +35,15 @@ def test_who_stood_still_is_back_soon(neighbours: dict[str, str], what: str) -> 
 
 @pytest.mark.parametrize("seed", range(207, 207 + repeats(1, 40)))
 def test_all_come_together_after_a_history(seed: int) -> None:
-    history = History.of(seed)
+    _check(History.of(seed))
+
+
+@pytest.mark.parametrize("seed", range(2811, 2811 + repeats(1, 40)))
+def test_writers_that_are_told_to_end_take_nothing_along(seed: int) -> None:
+    _check(History.of(seed, "abcd", ends=True))
+
+
+def _check(history: History) -> None:
     result = play(history)
     assert result.good, f"{history}: {result}"
     assert result.seconds is not None

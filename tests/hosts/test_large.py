@@ -61,6 +61,8 @@ with rosz.Node(sys.argv[1]) as node:
 """Prints what it hears on ``large``, and at last how late the small messages were."""
 
 _BYTES_PER_SECOND = 2_000_000
+PATIENT = "transport/link/tx/lease=3600000"
+"""Others keep the link of a process that is stopped for as long as the test takes."""
 LISTEN = "tcp/0.0.0.0:7447"
 
 
@@ -80,8 +82,8 @@ def link(robot: Host, *others: Host, linked: str) -> None:
             other.variables["ROSZ_CONNECT"] = "tcp/robot:7447"
 
 
-def listen(host: Host, name: str) -> HostProgram:
-    listener = host.program(LISTENER, name)
+def listen(host: Host, name: str, **variables: str) -> HostProgram:
+    listener = host.program(LISTENER, name, **variables)
     listener.wait_for("ready")
     return listener
 
@@ -141,19 +143,24 @@ def test_a_slow_link_is_nobody_elses_problem(world: World) -> None:
     slow, fast, near = listen(laptop, "slow"), listen(other, "fast"), listen(robot, "near")
     talker = robot.program(TALKER, "300000")
     talker.wait_for("talking")
-    laptop.link.degrade(rate=_BYTES_PER_SECOND / 4)
-    talker.say("3 0 60 0.03")
-    told = talker.wait_for("longest", 60).split()
-    assert float(told[1]) < 0.5 * slack()
-    dropped = int(told[3])
-    assert dropped > 0
+    laptop.link.degrade(rate=_BYTES_PER_SECOND / 32)  # 5 s for each, on any machine
+    count = 40
+    for number in range(count):  # each when the others have the one before
+        talker.say(f"3 {number} {number + 1} 0")
+        told = talker.wait_for("longest", 60, after=number + 1).split()
+        assert float(told[1]) < 0.5 * slack()
+        for listener in (fast, near):
+            listener.wait_for(f"large {number}", 60)
     for listener in (fast, near):
-        listener.wait_for("large 59", 60)
-        assert heard(listener) == [*range(60)]
-    slow.wait_for("large 59", 60)
+        assert heard(listener) == [*range(count)]
+    laptop.link.heal()  # what waits still comes
+    slow.wait_for(f"large {count - 1}", 60)
+    talker.say("0 0 0 0")  # the last ones were dropped after they were published
+    dropped = int(talker.wait_for("longest", after=count + 1).split()[3])
+    assert dropped > 0
     assert heard(slow) == sorted(heard(slow))
     assert len(heard(slow)) >= 10  # the queue of the publisher
-    assert lost(slow) == dropped == 60 - len(heard(slow))
+    assert lost(slow) == dropped == count - len(heard(slow))
     for program, what in ((talker, "for node '/slow'"), (slow, "come faster than")):
         (warning,) = [
             line for line in program.output.splitlines() if "dropping messages on '/large'" in line
@@ -170,15 +177,19 @@ def test_a_stopped_subscription_holds_nobody_up(world: World) -> None:
     """It gets what the queue of the publisher still has when it goes on."""
     robot, laptop, other = world.hosts("robot", "laptop", "other")
     link(robot, laptop, other, linked="nodes")
-    stopped, running = listen(laptop, "stopped"), listen(other, "running")
+    stopped = listen(laptop, "stopped", ZENOH_CONFIG_OVERRIDE=PATIENT)
+    running = listen(other, "running")
     talker = robot.program(TALKER, "1000000")
     talker.wait_for("talking")
     talker.say("2 0 1 0")
     stopped.wait_for("large 0")
     stopped.send(signal.SIGSTOP)
-    talker.say("2 1 31 0.02")
-    assert float(talker.wait_for("longest", 60, after=2).split()[1]) < 0.5 * slack()
-    running.wait_for("large 30", 60)
+    # Each when the one before has arrived: the queue of the publisher has room for the running one.
+    for number in range(1, 31):
+        talker.say(f"1 {number} {number + 1} 0")
+        line = talker.wait_for("longest", 60, after=number + 1)
+        assert float(line.split()[1]) < 0.5 * slack()
+        running.wait_for(f"large {number}", 60)
     assert heard(running) == [*range(31)]
     stopped.send(signal.SIGCONT)
     stopped.wait_for("large 30", 60)

@@ -6,6 +6,7 @@ import shutil
 import sys
 
 import pytest
+from cached import zenohd
 from network import eventually, repeats
 
 from hosts.host import Host, HostProgram
@@ -205,13 +206,14 @@ with zenoh.open(config):
     print("started router", flush=True)
     time.sleep(1000)
 """
-"""What ``rmw_zenohd`` runs with its own configuration, and ``zenohd`` nearly so."""
+"""What ``rmw_zenohd`` runs with its own configuration."""
 
 
-def test_a_router_that_is_not_ours(world: World) -> None:
+@pytest.mark.parametrize("program", ["zenohd", "of ROS 2"])
+def test_a_router_that_is_not_ours(world: World, program: str) -> None:
     robot, laptop = world.hosts("robot", "laptop")
-    if shutil.which("zenohd"):
-        router = robot.execute("zenohd", "-l", "tcp/[::]:7447", "--no-multicast-scouting")
+    if program == "zenohd":
+        robot.execute(str(zenohd()), "-l", "tcp/[::]:7447", "--no-multicast-scouting")
     else:
         router = robot.execute(sys.executable, "-c", ROUTER)
         router.wait_for("started router")

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from functools import partial
-from pathlib import Path
 
 import pytest
+from cached import zenohd
 from network import eventually
 
 from hosts.host import Host, HostProgram
@@ -15,13 +13,6 @@ from hosts.scripts import COUNTER, LISTENER, TALKER
 from hosts.world import World
 
 LISTEN = "tcp/0.0.0.0:7447"
-CARGO = Path(os.environ.get("CARGO_HOME") or Path.home() / ".cargo")
-ZENOHD = shutil.which("zenohd", path=f"{os.environ.get('PATH', '')}:{CARGO}/bin")
-
-pytestmark = pytest.mark.skipif(
-    ZENOHD is None, reason="needs zenohd: cargo install --locked zenohd --version '~1.10'"
-)
-
 HEARS_BOTH = """
 import rosz
 from rosz.msgs.std_msgs.msg import String
@@ -37,7 +28,7 @@ def router(host: Host, *options: str, **variables: str) -> HostProgram:
     """Start ``zenohd`` with what ``rosz core --print-config`` prints, and wait for it."""
     file = host.home / "zenohd.json5"
     file.write_text(host.ask("core", "--print-config", *options, **variables))
-    started = host.execute(str(ZENOHD), "--config", str(file), RUST_LOG="zenoh=info")
+    started = host.execute(str(zenohd()), "--config", str(file), RUST_LOG="zenoh=info")
     eventually(lambda: any(":7447" in one for one in host.listening()), "zenohd")
     return started
 

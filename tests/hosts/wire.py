@@ -1,4 +1,5 @@
-"""A bad cable: ``wire.py ONE OTHER DELAY LOSS RATE`` carries frames between two TAP interfaces.
+"""A bad cable: ``wire.py ONE OTHER DELAY LOSS RATE DUPLICATE REORDER`` carries frames between two
+TAP interfaces.
 
 Does what ``tc netem`` does, which many kernels come without. Ends with its standard input.
 """
@@ -20,6 +21,8 @@ _TAP_WITHOUT_HEADER = 0x0002 | 0x1000
 _FRAME = 65536
 _QUEUED_SECONDS = 1.0
 """What a full queue of a slow link holds; more is dropped, as a switch does."""
+_LATE_SECONDS = 0.02
+"""By how much a frame that others overtake is late at most."""
 
 
 def tap(name: str) -> int:
@@ -31,7 +34,7 @@ def tap(name: str) -> int:
 
 def main() -> None:
     one, other = tap(sys.argv[1]), tap(sys.argv[2])
-    delay, loss, rate = map(float, sys.argv[3:6])
+    delay, loss, rate, duplicate, reorder = map(float, sys.argv[3:8])
     chance = random.Random(1)
     order = itertools.count()
     waiting: list[tuple[float, int, int, bytes]] = []
@@ -50,7 +53,9 @@ def main() -> None:
             if chance.random() < loss or free[to] > now + _QUEUED_SECONDS:
                 continue
             free[to] = max(now, free[to]) + (len(frame) / rate if rate else 0.0)
-            heapq.heappush(waiting, (free[to] + delay, next(order), to, frame))
+            for _ in range(1 + (chance.random() < duplicate)):
+                late = _LATE_SECONDS * chance.random() if chance.random() < reorder else 0.0
+                heapq.heappush(waiting, (free[to] + delay + late, next(order), to, frame))
         while waiting and waiting[0][0] <= now:
             _, _, to, frame = heapq.heappop(waiting)
             try:

@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 MESSAGES: list[tuple[str, str]] = [
+    (
+        "float32 X=\u0131nf",
+        "bad.msg:1:11: constant 'X': expected a number of type float32, got '\u0131nf'",
+    ),
+    ("float64 x 1e999", "bad.msg:1:11: field 'x': 1e999 is outside the range of float64"),
+    ("float32[] x [inf, -1e39]", "bad.msg:1:19: field 'x': -1e39 is outside the range of float32"),
+    ("@keyboard int32 x", "bad.msg:1:1: expected a type, got '@keyboard'"),
+    ("string[] x [", "bad.msg:1:13: field 'x': the list is not closed; expected ']'"),
+    ("int32 a\n  a a", "bad.msg:2:5: 'a' is already declared in line 1"),
     ("int32", "bad.msg:1:6: expected a name after type 'int32'"),
     (
         "string a 'x\\ud800'",

@@ -67,6 +67,7 @@ def test_types(written: str, base: str, bound: int, shape: str, size: int) -> No
         ("float64 x 1", 1.0),
         ("float64 x -.5e3", -500.0),
         ("float32 x inf", float("inf")),
+        ("@key float32 x 3.4028235e38", 3.4028235e38),
         ('string x "a # b"', "a # b"),
         (r"string x 'it\'s'", "it's"),
         (r'string x "\tA\u00e9\"" # c', '\tA\u00e9"'),

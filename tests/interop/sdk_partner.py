@@ -17,6 +17,7 @@ import zenoh_ros2_sdk as sdk  # type: ignore[import-untyped]
 PORT, DOMAIN = int(sys.argv[1]), int(sys.argv[2])
 PLACE: dict[str, Any] = {"router_port": PORT, "domain_id": DOMAIN}
 KEPT: list[Any] = []
+PUBLISHERS: dict[str, Any] = {}
 
 
 def say(**answer: object) -> None:
@@ -32,8 +33,13 @@ def echo(source: str, target: str, kind: str) -> None:
         publisher.publish(**{n: v for n, v in fields.items() if not n.startswith("__")})
 
     KEPT.append(sdk.ROS2Subscriber(source, kind, again, node_name="sdk_echo", **PLACE))
-    KEPT.append(publisher)
+    PUBLISHERS[target] = publisher
     say(echo=source)
+
+
+def matched(target: str) -> None:
+    """Tell whether what it publishes on a topic reaches a subscription."""
+    say(matched=bool(PUBLISHERS[target].pub.matching_status.matching))
 
 
 def serve(name: str) -> None:
@@ -88,6 +94,7 @@ def main() -> None:
     sdk.get_registry().messages_dir = Path(sys.argv[3])
     commands: dict[str, Callable[..., None]] = {
         "echo": echo,
+        "matched": matched,
         "serve": serve,
         "call": call,
         "types": types_of,

@@ -7,12 +7,12 @@ encoding, and publishes with other congestion control. All of that has to be put
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import json
 import math
 from array import array
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -29,7 +29,7 @@ from rosz.msgs.nav_msgs.msg import Odometry
 from rosz.msgs.rcl_interfaces.msg import ParameterEvent
 from rosz.msgs.sensor_msgs.msg import Image, JointState
 from rosz.msgs.std_msgs.msg import Header, String
-from rosz.node import MessageInfo, Node, Publisher, Subscription
+from rosz.node import MessageInfo, Node, Publisher
 from rosz.session import Session, SessionConfig
 
 INTERFACES = Path(__file__).parents[2] / "interfaces"
@@ -98,23 +98,11 @@ def node(city: Network) -> Node:
     return city.node("rosz_side")
 
 
-def wait_for_echo(there: Publisher[Any]) -> None:
+def wait_for_echo(sdk: Partner, there: Publisher[Any]) -> None:
     """Wait until the SDK hears us, and we it: it announces both before they work."""
     there.wait_for_subscribers(timeout=TIMEOUT)
     eventually(lambda: there._raw.matched, "a route to the SDK's subscriber")
-    there.node.context.graph.wait_for_topic("/back", TIMEOUT)
-
-
-def came_back(there: Publisher[Any], back: Subscription[Any], message: Message) -> bool:
-    """Send a message, and return whether the next one that comes back is the same.
-
-    The SDK may not know of the subscription to what it sends when the first message arrives there.
-    """
-    there.publish(message)
-    with suppress(WaitTimeout):
-        received: Message = back.get(1.0)
-        return received.to_cdr() == message.to_cdr()
-    return False
+    eventually(lambda: sdk("matched", "/back")["matched"], "a route to our subscription")
 
 
 @pytest.mark.parametrize("kind", dict.fromkeys(type(message) for message in MESSAGES))
@@ -123,11 +111,12 @@ def test_topics_both_ways(sdk: Partner, node: Node, kind: type[Message]) -> None
     back = node.subscription("back", kind)
     there = node.publisher("there", kind)
     sdk("echo", "/there", "/back", kind._type_name)
-    wait_for_echo(there)
+    wait_for_echo(sdk, there)
     for message in MESSAGES:
         if type(message) is kind:
+            there.publish(message)
             # A sequence that was never set is a list, a received one an array.
-            eventually(partial(came_back, there, back, message), "the same message")
+            assert back.get(TIMEOUT).to_cdr() == message.to_cdr()
 
 
 def test_generic_and_info(sdk: Partner, node: Node) -> None:
@@ -137,7 +126,7 @@ def test_generic_and_info(sdk: Partner, node: Node) -> None:
     node.subscription("back", String, lambda _, info: got.put(info), with_info=True)
     there = node.publisher("there", String)
     sdk("echo", "/there", "/back", "std_msgs/msg/String")
-    wait_for_echo(there)
+    wait_for_echo(sdk, there)
     for number in range(3):
         there.publish(str(number))
         assert generic.get(TIMEOUT).data == str(number)
@@ -164,6 +153,7 @@ def test_serving_its_client(sdk: Partner, node: Node) -> None:
         return int(request.a + request.b)
 
     node.service("add", AddTwoInts, add)
+    eventually(lambda: "/add" in sdk("see")["services"], "the service")
     assert sdk("call", "/add", 20, 22) == {"sum": 42}
     assert sdk("call", "/add", -1, 0) == {"sum": None}
 
@@ -228,6 +218,19 @@ def test_events_of_parameters(sdk: Partner, node: Node) -> None:
     eventually(
         lambda: sdk("inspect", "/parameter_events")["publishers"] == [publisher], "our publisher"
     )
+    eventually(lambda: sdk("matched", "/back")["matched"], "a route to our subscription")
+    numbers = itertools.count()
+
+    def comes() -> bool:
+        node.params["~number"] = next(numbers)
+        with suppress(WaitTimeout):
+            return bool(back.get(1.0))
+        return False
+
+    eventually(comes, "an event, when there is a route to the SDK's subscriber")
+    node.params["~number"] = -1
+    while [row.value.integer_value for row in back.get(TIMEOUT).changed_parameters] != [-1]:
+        pass
     for number in range(3):
         node.params["~gains"] = {"p": 0.5, "n": number}
         event = back.get(TIMEOUT)

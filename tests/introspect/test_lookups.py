@@ -74,9 +74,9 @@ def test_nodes_that_reply_late_are_found_by_name(
     asked: list[str] = []
     live_tokens = Session.live_tokens
 
-    def reply_late(session: Session, key: str, timeout: float) -> list[str]:
+    def reply_late(session: Session, key: str, timeout: float, looks: int = 1) -> list[str]:
         asked.append(key)
-        return [] if len(asked) == 1 else live_tokens(session, key, timeout)
+        return [] if len(asked) == 1 else live_tokens(session, key, timeout, looks)
 
     monkeypatch.setattr(Session, "live_tokens", reply_late)
     survey = take_survey(context.session, context.domain, nodes=["/robot"])

@@ -302,7 +302,7 @@ def test_observers_hear_of_jumps_back() -> None:
 def test_observers_hear_of_leaps_forward_when_asked() -> None:
     clock = SimulatedClock(0)
     jumps: list[TimeJump] = []
-    clock.on_jump(jumps.append, forward_ns=SECOND)
+    clock.on_jump(jumps.append, wanted=lambda jump: jump.delta >= SECOND or jump.delta < 0)
     for moment in (START, START + SECOND - 1, START + 2 * SECOND - 1, START):
         clock.advance(moment)
     assert [jump.delta for jump in jumps] == [SECOND, -(2 * SECOND - 1)]
@@ -323,20 +323,6 @@ def test_all_observers_are_called_though_one_fails() -> None:
     assert jumps == [TimeJump(START, 1)]
 
 
-def test_what_one_said_before_is_no_jump_back() -> None:
-    """Several nodes of a context hear the same `/clock`, each in its own time."""
-    clock = SimulatedClock(0)
-    jumps: list[TimeJump] = []
-    clock.on_jump(jumps.append)
-    clock.advance(START, publisher=b"gazebo", number=1)
-    clock.advance(START + 2, publisher=b"gazebo", number=3)
-    clock.advance(START + 1, publisher=b"gazebo", number=2)
-    assert (clock.now(), jumps) == (START + 2, [])
-    clock.advance(START, publisher=b"gazebo", number=4)
-    clock.advance(START - 1, publisher=b"another", number=1)
-    assert jumps == [TimeJump(START + 2, START), TimeJump(START, START - 1)]
-
-
 def test_observer_may_use_the_clock() -> None:
     clock = SimulatedClock()
     seen: list[int] = []
@@ -344,3 +330,70 @@ def test_observer_may_use_the_clock() -> None:
     clock.advance(1)
     assert seen == [1]
     assert clock.now() == START
+
+
+def test_a_branch_may_have_a_time_of_its_own() -> None:
+    """It is closed with the clock that it is a branch of, all the same."""
+    clock = Clock()
+    branch = clock.branch(apart=True)
+    beds = branch._source.sleepers = Beds()
+    branch.enable_simulation()
+    branch.advance(START)
+    assert branch.simulated
+    assert not clock.simulated
+    task = Task(lambda: branch.branch().sleep(SECOND))
+    assert beds.taken.acquire(timeout=TIMEOUT)
+    clock.close()
+    assert task.result() is False
+
+
+@pytest.mark.parametrize("start", [0, START])
+def test_sleeps_end_by_wall_time_when_the_simulation_ends(start: int) -> None:
+    clock = SimulatedClock(start)
+    until = time.time_ns() + 30_000_000
+    tasks = [
+        clock.asleep(lambda: clock.sleep(20_000_000)),
+        clock.asleep(lambda: clock.sleep_until(until)),
+        clock.asleep(clock.wait_started) if not start else Task(lambda: True),
+    ]
+    clock.disable_simulation()
+    assert all(task.result() is True for task in tasks)
+    assert time.time_ns() >= until
+    assert abs(clock.now() - time.time_ns()) < TIMEOUT * SECOND
+
+
+def test_what_a_simulated_sleep_has_done_is_not_done_again() -> None:
+    clock = SimulatedClock()
+    task = clock.asleep(lambda: clock.sleep(1000 * SECOND))
+    clock.advance(START + 1000 * SECOND - 1)
+    clock.disable_simulation()
+    assert task.result() is True
+
+
+def test_a_simulation_that_begins_anew_has_no_time_yet() -> None:
+    clock = SimulatedClock()
+    clock.disable_simulation()
+    clock.disable_simulation()
+    clock.enable_simulation()
+    assert clock.now() == 0
+
+
+def test_observers_of_switches() -> None:
+    clock = Clock()
+    told: list[object] = []
+
+    def before() -> None:
+        told.append(clock.simulated)
+
+    clock.on_jump(told.append, wanted=lambda jump: jump.switched, before=before)
+    clock.enable_simulation()
+    clock.enable_simulation()
+    clock.advance(START)
+    clock.advance(1)
+    clock.disable_simulation()
+    first, on, second, off = told
+    assert (first, second) == (False, True)
+    assert isinstance(on, TimeJump)
+    assert isinstance(off, TimeJump)
+    assert (on.after, off.before, on.switched, off.switched) == (0, 1, True, True)
+    assert abs(off.after - time.time_ns()) < TIMEOUT * SECOND

@@ -11,7 +11,8 @@ from network import TIMEOUT, Network, repeats
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Context, standard
-from rosz.session import MeshReadiness
+from rosz.session import LocalPeers, MeshReadiness
+from rosz.session.local_peers import LocalPeer, LocalRegistration
 
 ONE_SHOT = """
     import sys
@@ -84,6 +85,8 @@ def test_order_of_what_is_held(network: Network, monkeypatch: pytest.MonkeyPatch
 
 def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     """The newest thousand are kept."""
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", 0.1)
+    monkeypatch.setattr(Context, "HOLD_TIMEOUT", TIMEOUT)
     network.context()
     subscription = network.node("listener").subscription("chatter", String, queue_size=2000)
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)  # waits for the same as we do
@@ -103,6 +106,8 @@ def test_what_is_held_is_bounded(network: Network, monkeypatch: pytest.MonkeyPat
 
 def test_bytes_that_are_held_are_bounded(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rosz.node.publisher._HELD_BYTES", 100_000)
+    monkeypatch.setattr(Context, "MESH_TIMEOUT", 0.1)
+    monkeypatch.setattr(Context, "HOLD_TIMEOUT", TIMEOUT)
     network.context()
     subscription = network.node("listener").subscription("chatter", String, queue_size=2000)
     monkeypatch.setattr(standard, "follow_clock", lambda _: None)
@@ -157,6 +162,31 @@ def test_time_of_holding_is_bounded(
     assert subscription.get().data == "hello"
     assert time.monotonic() - began >= 1.0
     assert "not linked to 1 other session(s)" in caplog.text
+
+
+def test_one_that_begins_at_the_same_moment(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is waited for, although it was not there yet when this one began."""
+    read = LocalPeers.read
+    registrations: list[LocalRegistration] = []
+
+    def read_before(rendezvous: str, own: LocalPeer | None = None) -> LocalPeers:
+        peers = read(rendezvous, own)
+        if own is None:
+            registrations.append(LocalRegistration(rendezvous))
+        return peers
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Context, "MESH_TIMEOUT", TIMEOUT)
+        patch.setattr(LocalPeers, "read", read_before)
+        context = network.context()
+    assert not context.mesh.ready.is_set()
+    other = network.session()
+    assert context.mesh.ready.wait(TIMEOUT)
+    assert context.session.peers() == [other.zid]
+    (registration,) = registrations
+    registration.close()
 
 
 def test_nobody_else_no_wait(network: Network) -> None:

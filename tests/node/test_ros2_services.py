@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
+import threading
 import time
 from array import array
+from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any
 
@@ -12,6 +14,7 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ParamError
+from rosz.lifecycle import Registration
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.rcl_interfaces.msg import (
     Parameter,
@@ -30,6 +33,7 @@ from rosz.msgs.rcl_interfaces.srv import (
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
 from rosz.node import Client, Node
+from rosz.node.ros2 import detector, parameters, remote
 from rosz.node.ros2.values import from_ros2, to_ros2
 from rosz.params import DELETED
 from rosz.qos import PARAMETERS
@@ -147,7 +151,7 @@ def test_describe(asker: Node) -> None:
     assert (rate.name, rate.type, rate.read_only, rate.dynamic_typing) == ("rate", 3, False, True)
     assert (odd.type, odd.read_only) == (4, True)
     assert odd.additional_constraints == "YAML of a list, which ROS 2 has no type for"
-    assert (sim.type, sim.read_only) == (1, True)
+    assert (sim.type, sim.read_only) == (1, False)
     assert (none.name, none.type) == ("none", 0)
 
 
@@ -183,8 +187,7 @@ def test_set(asker: Node, talker: Node) -> None:
     assert [result.reason for result in results if not result.successful] == [
         "'gains' is not a parameter: there are parameters below it",
         "'odd' is a list that ROS 2 has no type for: set '/robot/talker/odd' with 'rosz param set'",
-        "'use_sim_time' is the same for all nodes: set '/use_sim_time' with 'rosz param set' before"
-        " they start",
+        "'use_sim_time' cannot be the int 1; expected bool",
         "'' is not the name of a parameter",
         "'none' is not set",
         "'77' is not a type of parameter; expected 0 to 9",
@@ -206,6 +209,21 @@ def test_set_atomically(asker: Node, talker: Node) -> None:
     assert talker.params["~rate"] == 6
     assert talker.params["~a"] == 1
     assert "~gains/p" not in talker.params
+
+
+def test_simulated_time_is_set_while_the_node_runs(asker: Node, talker: Node) -> None:
+    put = client(asker, "set_parameters", SetParameters)
+
+    def switch(value: ParameterValue) -> bool:
+        (result,) = put([Parameter("use_sim_time", value)]).results
+        assert result.successful
+        return talker.clock.simulated
+
+    assert switch(to_ros2(True)) is True
+    assert switch(to_ros2(False)) is False
+    assert switch(to_ros2(True)) is True
+    assert switch(ParameterValue()) is False
+    assert not asker.clock.simulated
 
 
 def test_arrays_arrive_as_lists(asker: Node, talker: Node) -> None:
@@ -297,6 +315,52 @@ def test_humble_has_no_type_descriptions(network: Network) -> None:
     node = network.node("old", context=context)
     node.client("old/list_parameters", ListParameters).wait_for_service(TIMEOUT)
     assert "/old/get_type_description" not in node.context.graph.view().services()
+
+
+def test_a_node_that_starts_beside_ros2(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is there may be found, and the services declared, before the detector is made."""
+    tried = threading.Event()
+
+    def start(thread: threading.Thread) -> None:
+        thread.start()
+        thread.join(0.5)  # long enough to fail, or to wait for the registration
+        tried.set()
+
+    def register(unregister: Callable[[], object]) -> Registration:
+        assert tried.wait(TIMEOUT)
+        return Registration(unregister)
+
+    node = Token(network.domain, "abc", 0, 0, Kind.NODE, "/", "of_ros2")
+    kept = network.session().token(format_token(node))
+    monkeypatch.setattr(detector, "start_thread", start)
+    monkeypatch.setattr(detector, "Registration", register)
+    graph = network.node("late").context.graph
+    graph.wait_for_service("/late/get_parameters", TIMEOUT)
+    kept.close()
+
+
+def test_a_client_that_sees_the_first_service_calls_another(
+    asker: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A busy node takes its time from one service to the next."""
+    go_on = threading.Event()
+    register = parameters._SharedService._open
+
+    def wait(service: parameters._SharedService, threads: int) -> None:
+        if service.name.endswith("/set_parameters"):
+            assert go_on.wait(TIMEOUT)
+        register(service, threads)
+
+    monkeypatch.setattr(parameters._SharedService, "_open", wait)
+    monkeypatch.setattr(remote, "_ATTEMPTS", 1)
+    first = client(asker, "list_parameters", ListParameters)
+    (server,) = first.others.view().servers(first.name)
+    request = remote.RemoteParameters(asker.context.session, server, TIMEOUT)
+    response = request.begin("set_parameters", [number("rate", 3)])
+    release = threading.Timer(0.2, go_on.set)  # by then, who has it would have refused it
+    release.start()
+    assert response().results[0].successful
+    release.join()
 
 
 def test_they_end_with_the_node(talker: Node, asker: Node) -> None:

@@ -498,6 +498,7 @@ class TestGeneric:
         for _ in range(3):
             publisher.publish(Strange("hello"))
             assert raw.get() == String("hello").to_cdr()
+        eventually(lambda: len(subscription._queue.items) == 3, "the same for the other one")
         with pytest.raises(WaitTimeout):
             subscription.get(0.01)
         listener.close()

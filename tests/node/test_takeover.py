@@ -85,6 +85,7 @@ def test_same_base_name_elsewhere_is_another_node(network: Network) -> None:
 
 def test_age_counts_and_not_the_clock(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     """A newer node takes over, though the clock of its machine is behind."""
+    monkeypatch.setattr(control, "_REPLY_TIMEOUT", TIMEOUT)  # without a reply, the clock counts
     with monkeypatch.context() as earlier:
         clock = SimpleNamespace(monotonic=lambda: time.monotonic() - 10, time_ns=time.time_ns)
         earlier.setattr(core, "time", clock)

@@ -13,8 +13,11 @@ from network import TIMEOUT, Network, eventually
 from rosz.errors import TypeNotFound, WaitTimeout
 from rosz.msgs.example_interfaces.srv import AddTwoInts
 from rosz.msgs.std_msgs.msg import String
+from rosz.msgs.turtlesim.action import RotateAbsolute
+from rosz.msgs.type_description_interfaces.msg import IndividualTypeDescription, TypeDescription
+from rosz.msgs.type_description_interfaces.srv import GetTypeDescriptionResponse
 from rosz.node import MessageInfo, Node
-from rosz.node.ros2.types import request_definition, request_type
+from rosz.node.ros2.types import request_action, request_definition, request_type
 from rosz.wire import Token
 
 PART = "float64 weight\ngeometry_msgs/Point[] corners\n"
@@ -151,3 +154,21 @@ def test_node_without_the_service(network: Network) -> None:
     token = publisher_token(node, "/chatter")
     with pytest.raises(WaitTimeout, match="/gone/get_type_description"):
         request_definition(node, msgspec.structs.replace(token, node="gone"), 0.05)
+
+
+@pytest.mark.parametrize("foreign", [False, True])
+def test_an_action_beside_services_of_another(
+    network: Network, monkeypatch: pytest.MonkeyPatch, foreign: bool
+) -> None:
+    """The other action has the same name, or types whose names are not those of ROS 2."""
+    network.node("turtle").action_server("/turn", RotateAbsolute, lambda _: None)
+    node, service = network.node(), "/turn/_action/send_goal"
+    name = "actionlib_tutorials/action/Fibonacci"
+    tokens = node.context.graph.wait_for_service(service, TIMEOUT).servers(service)
+    if foreign:
+        thing = TypeDescription(IndividualTypeDescription("Thing", []), [])
+        response = GetTypeDescriptionResponse(successful=True, type_description=thing)
+        name = "unknown_msgs/action/Turn"
+        monkeypatch.setattr("rosz.node.ros2.types._request", lambda *_, **__: response)
+    with pytest.raises(TypeNotFound, match="another hash than the server uses"):
+        request_action(node, name, tokens)

@@ -9,10 +9,12 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 from rosz.errors import TimeMovedBackwards
+from rosz.introspect import ParameterTree
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.rosgraph_msgs.msg import Clock
 from rosz.node import Node, Publisher
 from rosz.node.clock import TimeJump
+from rosz.params import split
 
 SECOND = 1_000_000_000
 
@@ -112,7 +114,8 @@ def test_nodes_of_one_process_do_not_set_time_back(network: Network, simulator: 
     context = network.context()
     nodes = [network.node(f"part{number}", context=context) for number in range(4)]
     jumps: list[TimeJump] = []
-    context.clock.on_jump(jumps.append)
+    for node in nodes:
+        node.clock.on_jump(jumps.append)
     for number in range(3000):
         simulator.tick(100 + number / 1000)
     simulator.set(nodes[0], 200)
@@ -128,3 +131,55 @@ def test_end_without_a_tick(network: Network, node: Node) -> None:
     eventually(lambda: len(node.clock._source.sleepers) == 1, "it sleeps")
     node.close()
     assert ended.get(timeout=TIMEOUT) is False
+
+
+def test_one_node_alone_while_it_runs(network: Network, simulator: Simulator) -> None:
+    """Its timers and rates go on, in either time; other nodes of the process keep theirs."""
+    simulator_node = network.node("other")
+    del simulator_node.params["/use_sim_time"]
+    context = network.context()
+    node, neighbour = (network.node(name, context=context) for name in ("switched", "neighbour"))
+    ticks: SimpleQueue[bool] = SimpleQueue()
+    node.timer(0.01, lambda _: ticks.put(node.clock.simulated))
+    turns: SimpleQueue[bool] = SimpleQueue()
+
+    def turn() -> None:
+        for _ in node.rate(100):
+            turns.put(node.clock.simulated)
+
+    network.thread(turn)
+    session = network.session()
+
+    def switch(value: object) -> None:
+        tree = ParameterTree(session, network.domain, pytest.fail)
+        tree.write([(split("/switched/use_sim_time"), value)])
+
+    def both_reach(simulated: bool) -> None:
+        for queue in (ticks, turns):
+            while queue.get(timeout=TIMEOUT) is not simulated:
+                pass
+
+    both_reach(False)
+    switch(True)
+    assert node.clock.simulated
+    assert not neighbour.clock.simulated
+    for number in range(500):
+        simulator.tick(100 + number / 10)
+    simulator.set(node, 150)
+    both_reach(True)
+    switch(False)
+    both_reach(False)
+    assert abs(node.now() - time.time_ns()) < 60 * SECOND
+    switch(True)
+    assert node.now() == 0
+    ParameterTree(session, network.domain, pytest.fail).delete("/switched/use_sim_time")
+    both_reach(False)
+    node.close()
+
+
+def test_a_private_parameter_comes_before_the_global_one(
+    network: Network, simulator: Simulator
+) -> None:
+    outside = network.node("outside", argv=["_use_sim_time:=false"])
+    assert not outside.clock.simulated
+    simulator.set(network.node("inside"), 5)

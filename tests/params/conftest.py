@@ -1,10 +1,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from oracle import Worker, require
 
+from .fleet import Fleet
 from .network import Network
 
 
@@ -21,3 +24,11 @@ def network() -> Iterator[Network]:
     found = Network()
     yield found
     found.close()
+
+
+@pytest.fixture
+def fleet() -> Iterator[Fleet]:
+    with TemporaryDirectory(prefix="rosz") as folder:
+        fleet = Fleet(Path(folder))
+        yield fleet
+        fleet.close()

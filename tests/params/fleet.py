@@ -21,7 +21,8 @@ ROOT = Path(__file__).parents[2]
 class Process(Program):
     """A member, which replies to requests in lines of JSON.
 
-    `tell` and `answer` are apart so that many work at a time.
+    `tell` and `answer` are apart so that many work at a time. Another root folder has another
+    version of rosz, and of the member.
     """
 
     def __init__(
@@ -33,6 +34,8 @@ class Process(Program):
         skew: float = 0.0,
         file: str = "",
         more: int = 0,
+        record: str = "",
+        root: Path = ROOT,
     ) -> None:
         settings = {
             "endpoint": endpoint,
@@ -42,10 +45,12 @@ class Process(Program):
             "file": file,
             "more": more,
         }
-        script = str(Path(__file__).with_name("member.py"))
+        if record:
+            settings["record"] = record
+        script = str(root / "tests" / "params" / "member.py")
         super().__init__(
             [sys.executable, "-P", script, json.dumps(settings)],
-            {**os.environ, "PYTHONPATH": str(ROOT)},
+            {**os.environ, "PYTHONPATH": str(root)},
             separate=True,
         )
         self._answered = 0

@@ -1,11 +1,12 @@
 """One replica as a process of its own, told what to do line by line on stdin.
 
 Run as: python member.py '{"endpoint": …, "mode": …, "connect": […], "skew": …, "file": …,
-"more": …}'
+"more": …, "record": …}'
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import sys
@@ -28,6 +29,9 @@ from rosz.session import (
     Stamp,
     serve_links,
 )
+
+_PATIENT = 50.0
+"""Seconds after which others count as silent; the default is for a machine that is not busy."""
 
 
 class SkewedClock(HybridClock):
@@ -61,7 +65,11 @@ class Member:
         skew: float,
         file: str,
         more: int,
+        record: str = "",
     ) -> None:
+        if record:
+            sys.path.append(str(Path(__file__).parents[1]))
+            importlib.import_module("params.recording").record_to(Path(record))
         begun = time.perf_counter()
         self._session = Session.open(
             SessionConfig(rendezvous=endpoint, mode=mode, connect=tuple(connect))
@@ -88,7 +96,7 @@ class Member:
     def do(self, verb: str, **arguments: Any) -> Any:
         return getattr(self, f"do_{verb}")(**arguments)
 
-    def do_set(self, name: str, value: Any, timeout: float = 2.0) -> Any:
+    def do_set(self, name: str, value: Any, timeout: float = _PATIENT) -> Any:
         begun = time.perf_counter()
         try:
             outcome = self.replica.set(name, value, timeout=timeout)
@@ -101,8 +109,8 @@ class Member:
         assert self._file is not None
         self._file._base.execute("PRAGMA max_page_count = 1")
 
-    def do_delete(self, name: str) -> Any:
-        return self.replica.delete(name).slow
+    def do_delete(self, name: str, timeout: float = _PATIENT) -> Any:
+        return self.replica.delete(name, timeout=timeout).slow
 
     def do_clear(self, namespace: str) -> Any:
         """Delete every parameter in a namespace, each by itself."""
@@ -118,7 +126,7 @@ class Member:
     def do_get(self, name: str) -> Any:
         return self.replica.get(name)
 
-    def do_storm(self, prefix: str, count: int, log: str, timeout: float = 2.0) -> Any:
+    def do_storm(self, prefix: str, count: int, log: str, timeout: float = _PATIENT) -> Any:
         """Set so many parameters, and note each in a file once it is acknowledged."""
         begun = time.perf_counter()
         note = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -131,7 +139,9 @@ class Member:
 
     def do_load(self, values: dict[str, Any], namespace: str) -> Any:
         begun = time.perf_counter()
-        outcome = self.replica.write(condense(spread(namespace, normalise(values))), timeout=20)
+        outcome = self.replica.write(
+            condense(spread(namespace, normalise(values))), timeout=_PATIENT
+        )
         return {"slow": outcome.slow, "seconds": time.perf_counter() - begun}
 
     def do_state(self) -> Any:

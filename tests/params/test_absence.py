@@ -66,11 +66,7 @@ class Copy:
         elif ours.digest() == EMPTY_DIGEST:
             ours.apply(theirs.writes())
         buckets = ours.differing(theirs.digest())
-        index = {
-            write.path: (write.time, write.clock)
-            for bucket in buckets
-            for write in ours.bucket(bucket)
-        }
+        index = {write.path: (write.time, write.clock) for write in ours.in_buckets(buckets)}
         found = theirs.compare(buckets, index, ours.horizon)
         if found.ahead:
             self.merge(other)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import gc
+from types import FunctionType, ModuleType
 
 import pytest
 
@@ -85,10 +87,10 @@ def test_who_joins_asks_the_next_when_one_is_silent_or_joins_itself() -> None:
     talk.say(said.QueryEnded(talk.only(done.SendQuery).number, SyncReply(b"", False)))
     assert not talk.all(done.Answer)
     talk.sleep(0.6)
-    talk.say(said.StoppedFound(frozenset()))
+    talk.say(said.StoppedPeersFound(frozenset()))
     assert not talk.all(done.Answer)
     talk.sleep(5.0)
-    talk.say(said.StoppedFound(frozenset(["bb", "cc"])))
+    talk.say(said.StoppedPeersFound(frozenset(["bb", "cc"])))
     watch = talk.only(done.FollowAll).watch
     talk.say(said.MemberCame(watch, D), said.MembersKnown(watch))
     assert [zid for zid, _ in requests(talk)] == ["dd"]
@@ -101,10 +103,10 @@ def test_nobody_joins_those_that_are_all_stopped() -> None:
     talk = Dialogue()
     talk.say(said.SeedCame(B), said.JoinCalled(JOIN))
     talk.sleep(0.3)
-    talk.say(said.StoppedFound(frozenset(["bb"])))
+    talk.say(said.StoppedPeersFound(frozenset(["bb"])))
     talk.say(said.MembersKnown(talk.only(done.FollowAll).watch))
     talk.sleep(0.3)
-    talk.say(said.StoppedFound(frozenset(["bb"])))
+    talk.say(said.StoppedPeersFound(frozenset(["bb"])))
     assert talk.answer is True
     assert "no replica of the parameters answered" in talk.all(done.Log)[0].text
 
@@ -165,6 +167,19 @@ def test_damaged_writes_are_refused_and_logged_once(bad: Record) -> None:
     talk.say(said.SyncReceived(4, SyncRequest(index=Index([1], [("a//b", 1, "c")]))))
     assert isinstance(talk.only(done.Reply).reply, str)
     assert talk.core.history.root == {"first": 0}
+
+
+def test_damaged_replies_count_as_one_kind_whoever_sends_them() -> None:
+    talk, _ = writer(B, C)
+    lines: list[done.Log] = []
+    talk.say(said.CompareCalled(talk.call(), 5.0))
+    for query in talk.all(done.SendQuery):
+        talk.say(
+            said.QueryEnded(query.number, SyncReply(records=[Record("a//b", 5, "c", "x", [1])]))
+        )
+        lines.append(talk.only(done.Log))
+    assert len({line.text for line in lines}) == 2
+    assert len({line.once for line in lines}) == 1
 
 
 def test_deletions_that_another_one_has_forgotten_are_followed() -> None:
@@ -240,3 +255,45 @@ def test_a_copy_of_a_core_goes_its_own_way() -> None:
     assert twin.answer.holders == 1
     talk.write("a", 2)
     assert twin.core.history.root["a"] == 1
+
+
+def size(thing: object) -> int:
+    """Return the number of objects that an object refers to, but for code."""
+    seen: set[int] = set()
+    rest = [thing]
+    while rest:
+        item = rest.pop()
+        if id(item) not in seen and not isinstance(item, (type, FunctionType, ModuleType)):
+            seen.add(id(item))
+            rest += gc.get_referents(item)
+            rest += item if isinstance(item, dict) else ()  # it names no keys that are texts
+    return len(seen)
+
+
+def test_a_core_keeps_nothing_of_replicas_that_come_and_go() -> None:
+    """They write, do not acknowledge, refuse comparisons, and leave, or are killed."""
+    talk, watch = writer(B)
+    sizes: list[int] = []
+    for generation in range(1, 5):
+        for number in range(150):
+            other = member(f"{generation}e{number}", 100 + number)
+            talk.say(said.MemberCame(watch, other))
+            if number < 10:
+                talk.say(said.SeedCame(other))
+                talk.write("own", number, timeout=0.1)
+                talk.sleep(0.3)
+            for query in talk.all(done.SendQuery):
+                talk.say(said.QueryEnded(query.number, None, failed=True))
+            stamp = WALL + int(talk.seconds * 1e9)
+            talk.say(said.BatchReceived(other.zid, 1, batch("theirs", number, stamp, other.zid)))
+            if number % 2:
+                talk.say(said.MemberLeft(other.zid, returns=False))
+            talk.say(said.SeedWent(other.zid), said.MemberWent(watch, other.zid))
+        talk.say(said.BatchReceived("bb", 1, batch("theirs", 0, WALL + 10**13 + generation)))
+        for _ in range(30):
+            talk.sleep(1.0)
+            for query in talk.all(done.SendQuery):
+                talk.say(said.QueryEnded(query.number, SyncReply(talk.core.history.digest())))
+        talk.timers = [entry for entry in talk.timers if entry[1].kind == "tick"]
+        sizes.append(size(talk.core))
+    assert len(set(sizes[1:])) == 1, sizes

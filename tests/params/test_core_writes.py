@@ -60,8 +60,8 @@ def test_a_batch_is_sent_once_more_and_then_the_late_are_named() -> None:
     number = talk.only(done.Publish).number
     talk.say(said.Acknowledged("bb", number))
     talk.sleep(0.25)
-    assert talk.only(done.FindStopped)
-    talk.say(said.StoppedFound(frozenset()))
+    assert talk.only(done.FindStoppedPeers)
+    talk.say(said.StoppedPeersFound(frozenset()))
     assert talk.only(done.Resend).zids == ("cc",)
     talk.sleep(1.74)
     assert not talk.all(done.Answer)
@@ -79,11 +79,25 @@ def test_a_batch_is_sent_once_more_and_then_the_late_are_named() -> None:
     assert talk.answer.slow == ()
 
 
+def test_a_timer_is_not_started_for_what_rounding_leaves() -> None:
+    """Else it would be due at the same time, again and again."""
+    talk, _ = writer(B)
+    talk.seconds = 127.753
+    due = talk.seconds + 0.25
+    assert 0.25 - (due - talk.seconds) > 0
+    assert due + (0.25 - (due - talk.seconds)) == due
+    talk.write()
+    talk.timers = [timer for timer in talk.timers if timer[1].kind == "delivery"]
+    talk.sleep(0.25)
+    assert talk.only(done.FindStoppedPeers)
+    assert [timer.seconds for timer in talk.all(done.StartTimer)] == [pytest.approx(1.75)]
+
+
 def test_who_is_stopped_is_not_sent_it_again_and_named_so() -> None:
     talk, _ = writer(B)
     talk.write(timeout=0.5)
     talk.sleep(0.25)
-    talk.say(said.StoppedFound(frozenset(["bb"])))
+    talk.say(said.StoppedPeersFound(frozenset(["bb"])))
     assert not talk.all(done.Resend)
     talk.sleep(0.25)
     assert talk.answer.slow == ("process bb (stopped)",)
@@ -166,6 +180,30 @@ def test_who_lost_all_waits_within_its_limit_and_says_so_once() -> None:
     assert not talk.all(done.Log)
 
 
+def test_one_that_lags_and_is_lost_is_named_once() -> None:
+    talk, watch = writer(B)
+    talk.write("a", timeout=0.3)
+    talk.write("b")
+    talk.sleep(0.4)
+    assert talk.answer.slow == ("process bb",)
+    talk.say(said.SeedWent("bb"), said.MemberWent(watch, "bb"))
+    talk.sleep(2.0)
+    assert talk.answer.slow == ("process bb (link lost)",)
+
+
+def test_one_that_lagged_before_it_is_lost_is_named_once() -> None:
+    talk, watch = writer(B, C)
+    talk.write("a", timeout=0.3)
+    talk.say(said.Acknowledged("cc", talk.only(done.Publish).number))
+    talk.sleep(0.4)
+    assert talk.answer.slow == ("process bb",)
+    talk.write("b")
+    talk.say(said.SeedWent("bb"), said.MemberWent(watch, "bb"))
+    talk.say(said.SeedWent("cc"), said.MemberWent(watch, "cc"))
+    talk.sleep(2.0)
+    assert talk.answer.slow == ("process bb (link lost)", "process cc (link lost)")
+
+
 def test_who_saw_all_others_leave_is_alone_without_ado() -> None:
     talk, watch = writer(B)
     talk.say(said.SeedWent("bb"), said.MemberWent(watch, "bb"))
@@ -206,6 +244,22 @@ def test_a_core_that_restarts_is_waited_for_under_its_new_session() -> None:
     assert talk.only(done.Resend).zids == ("dd",)
     talk.say(said.Acknowledged("dd", number))
     assert talk.answer.holders == 2
+
+
+def test_one_that_is_back_is_not_taken_for_an_earlier_life() -> None:
+    """Two lives of a program were lost: what expires later is neither of them, if one is back."""
+    talk, watch = writer(B)
+    second = type(B)(30, "b2", B.label)
+    talk.say(said.MemberCame(watch, second))
+    talk.say(said.SeedWent("bb"), said.MemberWent(watch, "bb"))
+    talk.say(said.MemberWent(watch, "b2"))
+    talk.sleep(8.5)
+    talk.say(said.MemberCame(watch, second))
+    talk.write("a", timeout=5.0)
+    talk.sleep(3.0)
+    assert not talk.all(done.Answer)
+    talk.sleep(2.0)
+    assert talk.answer.slow == (B.label,)
 
 
 def test_who_stood_still_waits_for_those_whose_links_are_gone() -> None:
@@ -269,3 +323,16 @@ def test_the_end_of_one_that_was_heard_is_at_once(others: tuple[object, ...]) ->
     talk.say(said.CloseCalled(talk.call()))
     assert talk.only(done.Leave)
     assert not talk.all(done.Log)
+
+
+def test_the_end_says_what_is_lost_if_others_left_long_after_one_was_lost() -> None:
+    talk, watch = writer(B, C)
+    talk.say(said.SeedWent("bb"), said.MemberWent(watch, "bb"))
+    talk.sleep(30.0)
+    talk.say(said.MemberLeft("cc"), said.SeedWent("cc"), said.MemberWent(watch, "cc"))
+    talk.write("a")
+    assert talk.answer.alone
+    assert "only this process has '/a'" in talk.only(done.Log).text
+    talk.say(said.CloseCalled(talk.call()))
+    talk.sleep(1.0)
+    assert "'/a' is lost with this process" in talk.all(done.Log)[-1].text

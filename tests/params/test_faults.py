@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pytest
 from network import TIMEOUT, free_port
@@ -24,14 +22,6 @@ SECONDS = 20.0 if FULL else 1.5
 STOPPED = 10.0 if FULL else 3.5
 LOADED = 5_000
 MANY = 200 if FULL else 40
-
-
-@pytest.fixture
-def fleet() -> Iterator[Fleet]:
-    with TemporaryDirectory(prefix="rosz") as folder:
-        found = Fleet(Path(folder))
-        yield found
-        found.close()
 
 
 def pass_time(seconds: float) -> None:
@@ -101,7 +91,7 @@ def test_two_halves_that_were_cut_apart_become_one(fleet: Fleet, kind: str) -> N
     right[1].answer()
     left[0].do("set", name="/both/shared", value="left", timeout=0.1)
     right[1].do("set", name="/both/shared", value="right, and later", timeout=0.1)
-    left[0].do("delete", name="/doomed/a")
+    left[0].do("delete", name="/doomed/a", timeout=0.1)
     right[0].do("set", name="/doomed/c", value=3, timeout=0.1)
     pass_time(SECONDS)
     if kind == "cut":
@@ -263,7 +253,7 @@ def test_a_full_disk_undoes_nothing_that_others_acknowledged(fleet: Fleet) -> No
     keeper.tell("set", name="/ns", value={"kept": 2, "gone": 2, "big": "x" * 100_000}, timeout=3.0)
     pass_time(1.0)
     assert other.do("set", name="/ns/kept", value=3, timeout=0.1)
-    assert other.do("delete", name="/ns/gone") is not None
+    assert other.do("delete", name="/ns/gone", timeout=0.1) is not None
     assert "not kept at member" in keeper.answer()["partly"]
     cable.mend()
     until_known([keeper, other])

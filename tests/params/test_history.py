@@ -256,8 +256,8 @@ def test_buckets_tell_what_differs(seen: list[list[Write]]) -> None:
     ours, theirs = of(left), of(right)
     differing = set(ours.differing(theirs.digest()))
     for index in range(64):
-        mine = {write.order for write in ours.bucket(index)}
-        other = {write.order for write in theirs.bucket(index)}
+        mine = {write.order for write in ours.in_buckets([index])}
+        other = {write.order for write in theirs.in_buckets([index])}
         assert (index in differing) == (mine != other)
 
 

@@ -7,7 +7,7 @@ from network import TIMEOUT, eventually
 
 from rosz.params.replica import Replica
 from rosz.params.replica.core import seeds as joining
-from rosz.params.replica.core.events import StoppedFound
+from rosz.params.replica.core.events import StoppedPeersFound
 from rosz.params.wire import Keys, ReplicaMember, SyncRequest, encode
 from rosz.session import SessionConfig
 
@@ -67,6 +67,19 @@ def test_a_replica_that_only_reads_follows_seeds_alone(network: Network) -> None
     assert all(known(one) == COUNT - 1 for one in others)
 
 
+def test_tokens_of_no_replica_are_reported_once(
+    network: Network, caplog: pytest.LogCaptureFixture
+) -> None:
+    replica = network.join(network.session())
+    other = network.session()
+    zid = "f" * 32
+    seed = KEYS.seed_token(age(replica)).replace(replica.zid, zid)
+    tokens = [other.token(f"{seed}/{number}") for number in range(5)]
+    tokens.append(other.token(seed))
+    eventually(lambda: zid in {one.zid for one in replica._runner.core.seeds()}, "a seed")
+    assert caplog.text.count("is not that of a replica (reported once)") == 1
+
+
 def test_others_become_seeds_when_these_go(network: Network) -> None:
     few, others = crowd(network)
     others[0].set("/kept", 1)
@@ -84,7 +97,7 @@ def test_seeds_that_are_too_many_follow_no_longer(network: Network) -> None:
     for replica in others:
         with replica._runner as _:
             replica._runner.core._seeding.become()
-        replica._runner.run(StoppedFound(frozenset()))
+        replica._runner.run(StoppedPeersFound(frozenset()))
     left, rest = sort_out(few + others)
     assert left == sorted(few + others, key=age)[: joining.SEEDS]
     eventually(lambda: all(known(one) == joining.SEEDS for one in rest), "the rest")

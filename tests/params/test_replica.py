@@ -126,7 +126,7 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
     eventually(lambda: sessions[1].live_tokens(Keys(0).tokens, TIMEOUT) != [])
     other = network.join(sessions[1])
     eventually(lambda: len(one.members()) == 1)
-    one._exchange._here[Publish] = bool
+    one._runner.handlers[Publish] = bool
     other._exchange._declared[
         4
     ].close()  # where it is told: rules leave such questions without an answer
@@ -135,7 +135,7 @@ def test_what_is_not_taken_rests_until_who_refused_comes_anew(
         assert one.compare(TIMEOUT)
         assert one.compare(TIMEOUT)
         key = f"{Keys(0).of(other.zid, 'tell')}/**"
-        take = partial(other._exchange._on_query, other._exchange._on_writes)
+        take = partial(other._exchange._on_query, "tell")
         network.keep(sessions[1].queryable(key, take, complete=True))
         assert one.compare(TIMEOUT)
     assert other.root == {}

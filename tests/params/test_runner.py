@@ -12,7 +12,7 @@ from network import TIMEOUT
 
 from rosz.errors import DecodeError, ParamError
 from rosz.params.replica.core import Config, ReplicaCore
-from rosz.params.replica.core.effects import Acknowledge, Effect, Reply
+from rosz.params.replica.core.effects import Acknowledge, Reply
 from rosz.params.replica.core.events import WriteCalled, WritesReceived
 from rosz.params.replica.core.store import NOT_A_PARAMETER
 from rosz.params.replica.runner import CoreRunner
@@ -39,12 +39,13 @@ class Shared(CoreRunner):
     def __init__(self) -> None:
         super().__init__(ReplicaCore(Config(ReplicaMember(1, "aa", "me"))), HybridClock("aa"))
         self.reasons: list[str] = []
-        self.carry_out = self.note
+        self.handlers |= {Acknowledge: self.note, Reply: self.note}
 
-    def note(self, effect: Effect) -> None:
+    def note(self, effect: Acknowledge | Reply) -> None:
         if isinstance(effect, Acknowledge):
             self.reasons.append(effect.reason)
-        assert not isinstance(effect, Reply) or not isinstance(effect.reply, str)
+        else:
+            assert not isinstance(effect.reply, str)
 
     def take(self, message: bytes) -> str:
         """Apply a message; return why it is refused."""
@@ -145,7 +146,7 @@ def test_a_read_waits_for_the_one_that_is_under_way(monkeypatch: pytest.MonkeyPa
 
 def test_noting_has_an_end() -> None:
     shared = state()
-    taken = [shared.defer(message(f"n{number}", number, number + 1)) for number in range(100)]
+    taken = [bool(shared.defer(message(f"n{at}", at, at + 1))) for at in range(100)]
     assert taken == [True] * 64 + [False] * 36
     assert len(shared.root) == 64
 

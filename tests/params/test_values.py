@@ -97,6 +97,10 @@ def test_a_zone_becomes_its_offset() -> None:
         (1j, "a complex is not a parameter value"),
         ("a\ud800b", r"character '\\ud800' at position 2 is half of a surrogate pair"),
         ({"\udfff": 1}, r"character '\\udfff' at position 1"),
+        (
+            {"x" * 2000: {"y" * 2100: 1}},
+            "at /x{60}/y{60}: its name would have more than 4096 bytes",
+        ),
         (LOOP, "nested more than 100 deep, or contains itself"),
     ],
 )

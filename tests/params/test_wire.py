@@ -102,6 +102,8 @@ def test_any_msgpack_is_a_message_or_the_named_error(kind: type[Any], value: Any
         (Batch(5, "a", "", [("", 1)]), "the root of all parameters is a dict"),
         (Batch(5, "a", "", [("a", None)]), "null is not a parameter value"),
         (Batch(5, "a", "", [("/".join("a" * 101), 1)]), "has 101 parts"),
+        (Batch(5, "a", "", [("a" * 4096, 1)]), "'a{60}…' has more than 4096 bytes"),
+        (Batch(5, "a", "", [("a" * 99, {"b" * 4000: 1})]), "more than 4096 bytes"),
     ],
 )
 def test_writes_that_mean_nothing_are_refused(message: Batch, reason: str) -> None:

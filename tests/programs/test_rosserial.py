@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import signal
@@ -11,6 +12,7 @@ import sys
 import time
 import tty
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -32,6 +34,7 @@ from rosz.programs.rosserial import (
     open_serial,
     pack,
 )
+from rosz.programs.rosserial.server import main
 
 REQUEST = bytes.fromhex("ff fe 00 00 ff 00 00 ff")
 """The request for topics, as the description has it."""
@@ -124,9 +127,12 @@ def board(network: Network, line: Line) -> Iterator[Board]:
 
 
 def lines_of(node: Node) -> Callable[[], list[str]]:
-    """Return a function that returns the lines of the log of all nodes."""
+    """Return a function that returns the lines of the log of all nodes, from now on."""
     found: list[str] = []
-    node.subscription("/rosout", "rcl_interfaces/Log", lambda log: found.append(log.msg))
+    # Some may be logged before the publisher is found, more than a usual queue asks it for then.
+    node.subscription(
+        "/rosout", "rcl_interfaces/Log", lambda log: found.append(log.msg), queue_size=0
+    )
     return lambda: list(found)
 
 
@@ -305,6 +311,59 @@ def test_a_device_by_tcp(network: Network) -> None:
             board.send(125, text(word))
             assert messages.get(timeout=TIMEOUT).data == word
     node.close()
+
+
+def test_connections_that_cannot_be_served(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of accept is told, a device too many refused; the next one is served again."""
+    errors = [OSError(errno.EMFILE, "Too many open files")]
+    accept = socket.socket.accept
+
+    def fail_once(self: socket.socket) -> tuple[socket.socket, Any]:
+        if errors:
+            raise errors.pop()
+        return accept(self)
+
+    monkeypatch.setattr("rosz.programs.rosserial.server._DEVICES", 1)
+    monkeypatch.setattr(socket.socket, "accept", fail_once)
+    node = network.node("serial_node")
+    lines = lines_of(network.node("user"))
+    server = TcpServer(node, 0)
+    network.thread(server.listen)
+    address = ("127.0.0.1", server.port)
+    with socket.create_connection(address, TIMEOUT) as first:
+        assert Board(first.fileno()).receive(TopicInfo.ID_PUBLISHER) == b""
+        with socket.create_connection(address, TIMEOUT) as second:
+            assert second.recv(1) == b""
+
+    def is_served() -> bool:
+        with socket.create_connection(address, TIMEOUT) as third:
+            return third.recv(1) == b"\xff"
+
+    def told(text: str) -> bool:
+        return any(text in line for line in lines())
+
+    eventually(is_served)
+    assert not errors
+    for text in ("cannot accept a connection: [Errno 24]", ": 1 devices are connected"):
+        eventually(partial(told, text))
+    node.close()
+
+
+def test_errors_of_serving_are_not_those_of_parameters(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(server: TcpServer) -> None:
+        server._socket.close()
+        raise ValueError("from a device")
+
+    for name, value in network.variables().items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "argv", ["serial_node.py", "tcp", "0"])
+    monkeypatch.setattr(TcpServer, "listen", fail)
+    with pytest.raises(ValueError, match="from a device"):
+        main()
 
 
 def start(network: Network, *argv: str) -> Program:

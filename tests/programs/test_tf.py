@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import subprocess
 import sys
 from queue import SimpleQueue
@@ -118,9 +119,13 @@ def test_publishers_listeners_and_commands(network: Network) -> None:
     command = start(network, "tf", "echo", "-n", "1", "map", "laser")
     assert command.exit_code() == 0, command.output
     assert command.lines[1] == "- Translation: [1.000, 0.000, 0.500]"
-    tree = start(network, "tf", "tree", "--wait", "4")
-    assert tree.exit_code() == 0, tree.output
-    assert tree.lines == ["map", "  base", "    laser"]
+
+    def tree() -> list[str]:
+        command = start(network, "tf", "tree", "--wait", "0.5")
+        assert command.exit_code() == 0, command.output
+        return command.lines
+
+    eventually(lambda: tree() == ["map", "  base", "    laser"], "what comes within half a second")
     watch = start(network, "run", "tf", "tf_monitor")
     watch.wait_for("Frame: base published by /mover Average Delay: ")
     for program in (static, moving):
@@ -162,14 +167,31 @@ def test_wrong_words(network: Network) -> None:
     network.node("setter").params["/unfit"] = {"speed": 1}
     for words, text in (
         (["tf", "static_transform_publisher", "1"], "usage: "),
+        (["tf", "static_transform_publisher", *"000000ab"], "got 8 arguments, expected 9 or 10"),
         (["tf2_ros", "static_transform_publisher"], "exited due to not having the right number"),
         (["tf2_ros", "static_transform_publisher", "/none"], "Could not read TF from parameter"),
         (["tf2_ros", "static_transform_publisher", "/unfit"], "Could not validate XmlRpcC"),
         (["tf", "tf_echo", "a", "b", "0"], "usage: "),
+        (["tf", "tf_echo", "a", "b", "_precision:=much"], "~precision is 'much'; expected from 0"),
+        (["tf", "tf_echo", "a", "b", "_precision:=-1"], "~precision is -1; expected from 0 to 99"),
     ):
         program = start(network, "run", *words)
         assert program.exit_code() == 255
         assert text in program.output
+
+
+def test_a_drawing_that_fails_is_one_line(network: Network) -> None:
+    dot = network.folder / "bin" / "dot"
+    dot.parent.mkdir()
+    dot.write_text("#!/bin/sh\nexit 3\n")
+    dot.chmod(0o755)
+    pose = TransformStamped(Header(frame_id="map"), "base")
+    StaticTransformBroadcaster(network.node("base")).send(pose)
+    variables = network.variables(PATH=f"{dot.parent}:{os.environ['PATH']}")
+    words = [sys.executable, "-P", "-m", "rosz", "run", "tf2_tools", "view_frames.py"]
+    program = network._keep(Program(words, variables, network.folder))
+    assert program.exit_code() == 1
+    assert program.lines[-1].startswith("view_frames: cannot draw 'frames.gv': Command ")
 
 
 CLIENT = """

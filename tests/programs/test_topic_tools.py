@@ -5,6 +5,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from ros1.programs.runners import Ros
 from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.topic_tools.srv import DemuxSelect, MuxSelect
 from rosz.node import Node
+from rosz.programs.topic_tools.expression import _evaluate
 from rosz.programs.topic_tools.mux import Demux, Mux
 from rosz.programs.topic_tools.relay import ByteLimit, PeriodLimit, RelayedTopic, Share
 
@@ -140,6 +142,10 @@ def test_a_stealthy_relay_hears_only_with_others(network: Network) -> None:
     publisher.wait_for_subscribers()
     heard = Heard(user, "/out")
     await_subscribers(relay, "/out", "/user")  # the relay stops listening without any
+    followed = relay.context.graph._whole
+    assert followed is not None
+    # Until then, the output that the first message announces does not know of its subscribers.
+    eventually(lambda: followed.complete, "all that the relay's graph looks for")
     publisher.publish("first")
     assert heard.next() == "first"
     await_subscribers(user, "/in")
@@ -282,6 +288,12 @@ def test_the_programs_do_what_those_of_ros_1_do(ros: Ros, network: Network, tmp_
         expected = pool.submit(run_script, RealSide(ros), tmp_path, USER, *COMMANDS)
         found = pool.submit(run_script, RoszSide(network), tmp_path, USER, *COMMANDS)
     assert found.result() == expected.result()
+
+
+def test_names_of_builtin_functions_are_texts() -> None:
+    fields = {"frame_id": "map", "child_frame_id": "object", "width": "m.height + max(1, 2)"}
+    point = SimpleNamespace(height=3)
+    assert _evaluate(fields, point) == fields | {"width": 5}
 
 
 def test_calls_of_a_mux(network: Network) -> None:

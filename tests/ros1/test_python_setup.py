@@ -10,6 +10,7 @@ from pathlib import Path
 from textwrap import dedent
 
 import pytest
+from cached import build_once
 from oracle import PYTHON, require
 
 from rosz.packages import PackageIndex
@@ -109,9 +110,8 @@ PROGRAMS = {
 }
 
 
-@pytest.fixture(scope="module")
-def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    top = tmp_path_factory.mktemp("ws")
+def write_packages(top: Path) -> None:
+    """Write the packages to a workspace."""
     for name, files in PACKAGES.items():
         messages = "add_message_files(FILES Bolt.msg)\ngenerate_messages()\n"
         build = BUILD.format(
@@ -126,25 +126,37 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
             path = top / "src" / name / file
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    top = tmp_path_factory.mktemp("ws")
+    write_packages(top)
     return top
 
 
 @pytest.fixture(scope="module")
-def devel(workspace: Path) -> Path:
-    """The devel space that real catkin makes of the packages."""
+def devel() -> Path:
+    """The devel space that real catkin makes of the packages, in a workspace of its own."""
     require("genpy", package="python3-genpy")
-    if shutil.which("catkin_make", path="/usr/bin") is None:
+    catkin_make = Path("/usr/bin/catkin_make")
+    if not catkin_make.exists():
         pytest.skip("catkin is not installed: apt-get install catkin")
-    command = ["/usr/bin/catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3"]
-    subprocess.run(
-        [*command, "both_generate_messages_py"],
-        cwd=workspace,
-        env={"PATH": "/usr/bin:/bin", "HOME": str(workspace)},
-        check=True,
-        capture_output=True,
-        timeout=300,
-    )
-    return workspace / "devel"
+
+    def make(place: Path) -> None:
+        write_packages(place)
+        options = ("-DPYTHON_EXECUTABLE=/usr/bin/python3", "both_generate_messages_py")
+        subprocess.run(
+            [catkin_make, *options],
+            cwd=place,
+            env={"PATH": "/usr/bin:/bin", "HOME": str(place)},
+            check=True,
+            capture_output=True,
+            timeout=300,
+        )
+
+    sources = repr((PACKAGES, MANIFEST, BUILD)).encode() + catkin_make.read_bytes()
+    return build_once("catkin", sources, make) / "devel"
 
 
 def rosz(*words: str, workspace: Path, home: Path) -> subprocess.CompletedProcess[str]:

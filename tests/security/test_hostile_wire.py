@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 from interop.plain import Plain, plain_session
-from network import TIMEOUT, Network, Program
+from network import TIMEOUT, Network, Program, repeats
 
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_msgs.msg import String
@@ -40,9 +40,10 @@ VICTIM = """
         for line in sys.stdin:
             print("memory", memory(), node.params.get("/a/b"), len(node.params.names()))
 """
-COUNT = 100_000
+COUNT = repeats(40_000, 100_000)
 MOST_LINES = 100
-MOST_GROWTH_MB = 40
+MOST_GROWTH_MB = COUNT // 2500
+"""In the second half. Zenoh itself keeps two thirds of it, for each key that a token ever had."""
 
 
 class Attacker:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hosts.host import Host, HostProgram
 from hosts.world import World
+from network import eventually
 
 from rosz.errors import UsageError
 from rosz.security import Authority, review_keys
@@ -73,6 +74,10 @@ class Fleet:
         listing = host.rosz("topic", "list")
         return listing.exit_code() == 0 and "/odom" in listing.output
 
+    def will_see_robot(self, host: Host) -> None:
+        """Wait until a host sees the robot's node, which links to its core anew."""
+        eventually(lambda: self.sees_robot(host), f"the robot at {host.name}")
+
 
 @pytest.fixture
 def fleet(world: World, authority: Authority) -> Fleet:
@@ -94,11 +99,11 @@ def test_a_live_link_ends_and_no_other_comes(fleet: Fleet) -> None:
     listing = fleet.laptop.rosz("topic", "list")
     assert listing.exit_code() == 1
     assert "the keys of this machine may have been revoked" in listing.output
-    assert fleet.sees_robot(fleet.desk)
+    fleet.will_see_robot(fleet.desk)
     assert fleet.robot.ask("param", "get", "/pin") == "vault-4711"
     fleet.authority.add("laptop", [fleet.laptop.address])
     fleet.laptop.variables["ROSZ_KEYS"] = str(fleet.authority.folder)
-    assert fleet.sees_robot(fleet.laptop)
+    fleet.will_see_robot(fleet.laptop)
     assert "got after" not in robot.output
 
 
@@ -132,8 +137,8 @@ def test_rules_are_read_anew(fleet: Fleet) -> None:
     assert fleet.sees_robot(fleet.desk)
     (fleet.authority.folder / "robot" / "rules.yaml").write_text("laptop: all\n")
     core.wait_for(AFRESH)
+    fleet.will_see_robot(fleet.laptop)
     assert not fleet.sees_robot(fleet.desk)
-    assert fleet.sees_robot(fleet.laptop)
 
 
 def test_whom_an_authority_revokes(authority: Authority) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
@@ -12,17 +11,12 @@ import pytest
 import zenoh
 from network import TIMEOUT, Network, eventually
 
-from rosz.session import Sample, Session, channels
+from rosz import worker
+from rosz.session import Sample, Session
 from rosz.session.at_exit import OPEN
-from rosz.session.channels import CallbackQueue, declare_callback, declare_rare
+from rosz.session.channels import CallbackQueue, declare_callback
 
 COUNT = 600  # more than Zenoh keeps for a thread of Python
-
-
-def _wakes(thread: threading.Thread) -> int:
-    """Return how often a thread has given up the processor by itself."""
-    status = Path(f"/proc/self/task/{thread.native_id}/status").read_text()
-    return int(status.partition("voluntary_ctxt_switches:")[2].split()[0])
 
 
 RARE: dict[str, Callable[[Session, Callable[..., None]], Any]] = {
@@ -32,56 +26,35 @@ RARE: dict[str, Callable[[Session, Callable[..., None]], Any]] = {
 }
 
 
-def until_heard(other: Session, heard: SimpleQueue[Any]) -> None:
-    """Put and query from another session until something is heard."""
+def send_until(other: Session, holds: Callable[[], object]) -> None:
+    """Put, query and begin tokens from another session until a condition holds."""
 
-    def is_heard() -> bool:
+    def sent() -> bool:
         other.put("a/b", b"")
         other.get("a/b", timeout=0.1)
-        return not heard.empty()
+        other.token("a/b").close()
+        return bool(holds())
 
-    eventually(is_heard)
+    eventually(sent)
 
 
 @pytest.mark.parametrize("kind", RARE)
-def test_no_thread_wakes_while_nothing_arrives(network: Network, kind: str) -> None:
+def test_no_thread_while_nothing_arrives(
+    network: Network, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker, "_LENT_SECONDS", 0.1)
     session, other = network.session(), network.session()
     before = set(threading.enumerate())
     heard: SimpleQueue[Any] = SimpleQueue()
     declared = RARE[kind](session, lambda *one: heard.put(one))
-    new = set(threading.enumerate()) - before
-    own = {one for one in new if "pyo3" in one.name}
-    assert own
-    assert all(one.daemon for one in own)
-    assert {one.name for one in new - own} <= {"rosz-lent"}
-    token = other.token("a/b")
-
-    until_heard(other, heard)
-    while not heard.empty():
-        heard.get()
-    counts = {one: _wakes(one) for one in own}
-    assert not threading.Event().wait(2.0)  # in which a thread that polls wakes twenty times
-    assert all(_wakes(one) - count < 10 for one, count in counts.items())
+    send_until(other, lambda: not heard.empty())
+    eventually(lambda: set(threading.enumerate()) <= before, "no thread")
     declared.close()
-    eventually(lambda: not any(one.is_alive() for one in own), "the end of its threads")
-    token.close()
-
-
-def test_a_failed_declaration_is_raised_and_leaves_no_thread(network: Network) -> None:
-    session = network.session()
-    before = set(threading.enumerate())
-
-    def fail(handler: Any) -> None:
-        session._raw.declare_subscriber("a//b", handler)
-
-    with pytest.raises(zenoh.ZError):
-        declare_rare(fail)
-    eventually(lambda: not {one for one in threading.enumerate() if "pyo3" in one.name} - before)
 
 
 def test_all_threads_that_receive_hear_of_the_end(network: Network) -> None:
     session = network.session()
-    queryable = session.pull_queryable("a", rare=True)
+    queryable = session.pull_queryable("a")
     ends: SimpleQueue[Any] = SimpleQueue()
     threads = [threading.Thread(target=lambda: ends.put(queryable.receive())) for _ in range(3)]
     for thread in threads:
@@ -136,28 +109,26 @@ def test_a_callback_may_wait_for_one_of_another_declaration(network: Network) ->
     second.close()
 
 
-@pytest.mark.usefixtures("no_threads")
 @pytest.mark.parametrize("kind", RARE)
-def test_callbacks_where_no_thread_is_left(network: Network, kind: str) -> None:
-    """They run on the thread that Zenoh has started."""
+def test_what_arrives_while_no_thread_is_left_is_handled_later(
+    network: Network, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker, "_LENT_SECONDS", 0.01)
     session, other = network.session(), network.session()
-    heard: SimpleQueue[str] = SimpleQueue()
-    declared = RARE[kind](session, lambda *_: heard.put(threading.current_thread().name))
-    token = other.token("a/b")
-
-    until_heard(other, heard)
-    assert "pyo3" in heard.get()
+    heard: SimpleQueue[Any] = SimpleQueue()
+    declared = RARE[kind](session, lambda *one: heard.put(one))
+    refused: list[object] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(worker, "lend_thread", refused.append)
+        send_until(other, lambda: refused)
+    send_until(other, lambda: not heard.empty())
     declared.close()
-    token.close()
 
 
-@pytest.fixture
-def no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lend no thread."""
-    monkeypatch.setattr(channels, "lend_thread", lambda _: False)
-
-
-def test_a_queue_is_handled_again_after_an_error(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_queue_is_handled_again_after_an_error(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker, "_LENT_SECONDS", 0.01)
     queue, handled = CallbackQueue(), SimpleQueue[str]()
 
     def handle() -> None:
@@ -166,15 +137,19 @@ def test_a_queue_is_handled_again_after_an_error(caplog: pytest.LogCaptureFixtur
         if item == "bad":
             raise ValueError("no such item")
 
-    queue.handle_with(handle, at_once=False)
+    serial = worker.Serial(handle)
+    queue.handle_with(serial)
     for item in ("bad", "good"):
-        queue.handler.callback(item)
+        queue.put(item)
         assert handled.get(timeout=TIMEOUT) == item
-        eventually(lambda: bool(queue._unhandled), "the end of the task")
+        eventually(
+            lambda: queue._serial is not None and not queue._serial._working.locked(),
+            "the end of the task",
+        )
     eventually(lambda: "no such item" in caplog.text, "the log")
 
 
-def test_a_failed_callback_declaration_is_not_waited_for(network: Network) -> None:
+def test_a_failed_declaration_is_raised_and_not_waited_for(network: Network) -> None:
     session = network.session()
     before = set(OPEN)
     with pytest.raises(zenoh.ZError):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import pytest
 from network import TIMEOUT, Network
 
-from rosz.errors import ClosedError
-from rosz.session import Cancellation, Session
+from rosz.errors import ClosedError, TransportError
+from rosz.session import Cancellation, Query, Session
 
 CALLS: dict[str, Callable[[Session], object]] = {
     "put": lambda session: session.put("a", b""),
@@ -20,8 +21,9 @@ CALLS: dict[str, Callable[[Session], object]] = {
     "subscriber": lambda session: session.subscriber("a", print),
     "subscriber with history": lambda session: session.subscriber("a", print, history=1),
     "pull_subscriber": lambda session: session.pull_subscriber("a", 1),
-    "pull_subscriber with history": lambda session: session.pull_subscriber(
-        "a", 1, history=1, recover=True
+    "queue_subscriber": lambda session: session.queue_subscriber("a", 1, print),
+    "queue_subscriber with history": lambda session: session.queue_subscriber(
+        "a", 1, print, history=1, recover=True
     ),
     "queryable": lambda session: session.queryable("a", print),
     "get": lambda session: session.get("a", timeout=1),
@@ -42,6 +44,24 @@ def test_nothing_works_after_close(network: Network, call: Callable[[Session], o
     assert session.closed
     with pytest.raises(ClosedError, match="the session is closed"):
         call(session)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in CALLS if "publisher" in name or "subscr" in name]
+)
+def test_closed_by_another_thread_just_after_the_check(
+    network: Network, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    session = network.session()
+    check = session._lifecycle.check_open
+
+    def check_and_close(doing: str) -> None:
+        check(doing)
+        session.close()
+
+    monkeypatch.setattr(session._lifecycle, "check_open", check_and_close)
+    with pytest.raises(ClosedError):
+        CALLS[name](session)
 
 
 DECLARED: dict[str, tuple[Callable[[Session], Any], Callable[[Any], object]]] = {
@@ -87,3 +107,31 @@ def test_closed_while_other_threads_use_it(
         assert not declared._entities, "it was not undeclared"
     assert {type(error) for error in ends} == {ClosedError}
     assert len(ends) == 30
+
+
+def test_a_query_that_another_thread_replies_to_is_closed(network: Network) -> None:
+    session = network.session()
+    errors: list[BaseException] = []
+
+    def answer(query: Query) -> None:
+        def report() -> None:
+            with suppress(TransportError):  # it is closed
+                while True:
+                    query.reply("a", b"more")
+
+        try:
+            reporter = network.thread(report)
+            query.reply("a", b"last")
+            query.close()
+            reporter.join(TIMEOUT)
+        except BaseException as error:
+            errors.append(error)
+            raise
+
+    queryable = session.queryable("a", answer)
+    for _ in range(20):
+        replies = [reply.payload for reply in session.get("a", timeout=TIMEOUT)]
+        assert b"last" in replies
+        assert b"Timeout" not in replies
+    queryable.close()
+    assert errors == []

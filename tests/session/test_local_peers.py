@@ -42,6 +42,8 @@ OLD = """
 """
 NEW = """
     import rosz
+    from rosz.params.replica import replica
+    rosz.Context.MESH_TIMEOUT = replica._MESH_TIMEOUT = 50.0  # a busy machine takes longer
     with rosz.Node("new") as node:
         print("read", sorted(node.params.get("/from", {})))
 """

@@ -56,10 +56,11 @@ def test_refused_at_first(network: Network, monkeypatch: pytest.MonkeyPatch) -> 
         opened.append(settings)
         if len(opened) > 1:
             return open_session(settings)
-        with socket.create_server(("127.0.0.1", port)) as other:
-            session = open_session(settings)
-            other.close()
-        return session
+        with socket.socket() as other:
+            other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            other.bind(("127.0.0.1", port))
+            other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)  # others may not listen
+            return open_session(settings)
 
     monkeypatch.setattr(zenoh, "open", refused_once)
     with Session.open(SessionConfig.node(network.environment())):

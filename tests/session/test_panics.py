@@ -20,6 +20,7 @@ CALLS: dict[str, Callable[[Session, str], object]] = {
     "rare subscriber": lambda session, key: session.subscriber(key, print, rare=True),
     "subscriber with history": lambda session, key: session.subscriber(key, print, history=1),
     "pull_subscriber": lambda session, key: session.pull_subscriber(key, 1),
+    "queue_subscriber": lambda session, key: session.queue_subscriber(key, 1, print),
     "queryable": lambda session, key: session.queryable(key, print),
     "pull_queryable": lambda session, key: session.pull_queryable(key),
     "get": lambda session, key: session.get(key, timeout=1),

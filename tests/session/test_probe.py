@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from network import TIMEOUT, Network
+from network import TIMEOUT, Network, free_port
 
 from rosz.errors import TransportError
 from rosz.session import Session, SessionConfig, first_listening
@@ -25,8 +25,7 @@ def served() -> Iterator[str]:
 
 @pytest.fixture
 def refused() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 def test_the_most_preferred_that_answers(served: str, refused: str) -> None:

@@ -207,8 +207,9 @@ def test_a_unix_socket_in_no_folder(network: Network) -> None:
 
 def test_a_client_waits_for_another_machine(network: Network) -> None:
     """What accepts its connections at first, such as a forwarded port, does not speak Zenoh."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    port = free_port()
+    endpoint = f"tcp/127.0.0.1:{port}"
+    with socket.create_server(("127.0.0.1", port)):
         early = network.program(PEER, "early", ROSZ_CONNECT=endpoint)
         early.wait_for(f"waiting for {endpoint}")
     with Session.open(SessionConfig(mode="router", rendezvous=endpoint)):

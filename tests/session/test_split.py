@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from rosz.session.stale_links import ViewDifferences
+import pytest
+from network import Network
+
+from rosz.session import stale_links
+from rosz.session.stale_links import CoreView, SplitWatch, ViewDifferences
 
 ONE, TWO = "1a", "2b"
 
@@ -41,3 +45,19 @@ def test_a_core_that_replies_no_more() -> None:
     assert differences.update({}, {TWO: None}, 0) is None
     assert differences.update({}, {TWO: None}, 15) == (TWO, "")
     assert differences.update({}, {}, 16) is None
+
+
+def test_cores_that_came_and_went_are_forgotten(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A core that starts afresh again and again has another id each time."""
+    monkeypatch.setattr(stale_links, "_PERIOD", 1e6)
+    session = network.session()
+    watch = SplitWatch(session, 0, (), lambda _: None)
+    for number in range(3000):
+        views: dict[str, CoreView] = {ONE: {}, f"{number:x}": {}}
+        monkeypatch.setattr(watch, "_replies", views.copy)
+        watch._compare()
+    assert len(watch._cores) == len(set(watch._cores)) == 1000
+    assert {ONE, f"{2999:x}"} <= set(watch._cores)
+    watch.close()

@@ -90,11 +90,10 @@ def numbers(chance: random.Random) -> list[float]:
     return [chance.uniform(-5, 5) for _ in range(3)] + [part / length for part in rotation]
 
 
-@pytest.mark.ros1
-@pytest.mark.parametrize("seed", range(6))
-def test_random_trees(seed: int) -> None:
+def random_tree(seed: int) -> list[str]:
+    """Return lines that fill a new buffer, and add what it is asked to the result."""
     chance = random.Random(seed)
-    lines: list[str] = []
+    lines = ["buffer = tf2_ros.Buffer(Duration(10), debug=False)"]
     frames = ["f0", "other"]
     for number in range(1, 8):
         parent = chance.choice(frames[:1] + frames[2:]) if number < 7 else "other"
@@ -110,12 +109,13 @@ def test_random_trees(seed: int) -> None:
         (chance.choice(frames), chance.choice(frames), chance.choice([0, 0, 2.5, 3.5, 9.0]))
         for _ in range(60)
     ]
-    same(
-        _SETUP
-        + "\n".join(lines)
-        + f"\nresult = [[ask(*one), known(*one)] for one in {questions}]\n",
-        *_REAL,
-    )
+    return [*lines, f"result += [[ask(*one), known(*one)] for one in {questions}]"]
+
+
+@pytest.mark.ros1
+def test_random_trees() -> None:
+    lines = [line for seed in range(6) for line in random_tree(seed)]
+    same(_SETUP + "\n".join(["result = []", *lines]) + "\n", *_REAL)
 
 
 @pytest.mark.ros1
@@ -251,7 +251,7 @@ def test_over_the_network(network: Network) -> None:
     moving._publisher.wait_for_subscribers()
     moving.send(transform("map", "base", 2.0))
     assert listener.can_transform("map", "laser", timeout=TIMEOUT)
-    assert buffer.wait(lambda: buffer.has("arm"), 15 * S, viewer.clock)
+    assert buffer.wait(lambda: buffer.has("arm"), int(TIMEOUT) * S, viewer.clock)
     pose, stamp = listener.lookup("map", "laser")
     assert (pose.translation[0], stamp) == (2.5, S)
     assert not listener.can_transform("map", "nothing")

@@ -138,9 +138,10 @@ def test_the_square_waits_until_the_turtle_stands() -> None:
 
 def test_draw_square_drives_the_turtle(network: Network, rosz: Callable[..., Program]) -> None:
     rosz("run", "turtlesim", "turtlesim_node").wait_for("Spawning")
+    watcher = Watcher(network.node("user"), "turtle1")
+    watcher.wait_for()
     program = rosz("run", "turtlesim", "draw_square")
     program.wait_for("New goal [7.544445 5.544445, 0.000000]")
-    watcher = Watcher(network.node("user"), "turtle1")
     assert watcher.wait_for(lambda pose: pose.x > START + 1).y == START
     program.wait_for("Reached goal")
 

@@ -5,6 +5,7 @@ import shutil
 import signal
 import struct
 import subprocess
+from array import array
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -45,9 +46,10 @@ class Display:
 
     def count(self, color: tuple[int, int, int]) -> int:
         """Return the number of pixels of a color."""
-        pixels = self.pixels()
-        wanted = bytes(reversed(color))
-        return sum(pixels[at : at + 3] == wanted for at in range(0, len(pixels), 4))
+        pixels = array("I", self.pixels())
+        red, green, blue = color
+        wanted = red << 16 | green << 8 | blue
+        return pixels.count(wanted) + pixels.count(wanted | 0xFF000000)
 
     def close(self) -> None:
         """Close the display."""

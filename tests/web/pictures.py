@@ -19,7 +19,7 @@ from network import Network, Program
 
 from rosz.web.pages.layout import ENTRIES
 
-from .robot import LONG, ROBOT, World, eventually, open_browser, set_screen
+from .robot import LONG, ROBOT, World, eventually, open_browser, set_screen, start_server
 
 LAUNCHES = Path(__file__).parents[2] / "launch"
 MANUAL = Path(__file__).parents[2] / "rosz" / "share" / "manual" / "pictures"
@@ -68,7 +68,7 @@ def lively() -> Iterator[World]:
                 "-m", "rosz", "bag", "record", "-O", bag, "--duration=4", "/odom", "/arm/chatter"
             )
             assert recorder.exit_code(LONG) == 0, recorder.output
-            server = network.run("-m", "rosz", "web", "--port", "0", "--bags", str(bags))
+            server = start_server(network, "--bags", str(bags))
             yield World(network, robot, server, browser)
     finally:
         network.close()

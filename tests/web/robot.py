@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 import shutil
 import threading
@@ -24,6 +25,7 @@ __all__ = (
     "eventually",
     "open_browser",
     "set_screen",
+    "start_server",
     "take_picture",
 )
 
@@ -182,6 +184,13 @@ with rosz.Node("robot") as node:
 """
 """A robot that drives in a circle, and everything around it."""
 
+_SERVER = """
+import os
+os.nice = lambda increment: 0
+from rosz.__main__ import main
+main()
+"""
+
 _CHROMIUM, _DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 _ARGUMENTS = (
     "--headless=new",
@@ -231,6 +240,11 @@ new MutationObserver(() => {
 """
 """Notifications disappear after seconds, in which a busy machine may not look at the page."""
 _SEEN = "return [document.body.innerText, ...window.notified].join('\\n')"
+
+
+def start_server(network: Network, *options: str, **variables: str) -> Program:
+    """Start ``rosz web`` at a free port. It would give way to all other programs: other tests."""
+    return network.program(_SERVER, "web", "--port", "0", *options, **variables)
 
 
 def _start(options: Any) -> Any:
@@ -283,17 +297,10 @@ def set_screen(browser: Any, screen: str, theme: str) -> None:
 
 
 def take_picture(browser: Any, folder: Path, name: str) -> None:
-    """Save what the browser shows."""
-    from selenium.common.exceptions import TimeoutException
-
+    """Save what the browser shows; its driver's own command would give up after 10 s."""
     folder.mkdir(exist_ok=True)
-
-    def attempt() -> bool:
-        with suppress(TimeoutException):  # the browser's own limit for a picture is 10 s
-            return bool(browser.save_screenshot(str(folder / f"{name}.png")))
-        return False
-
-    eventually(attempt, f"a picture of {name}")
+    found = browser.execute_cdp_cmd("Page.captureScreenshot", {"format": "png"})
+    (folder / f"{name}.png").write_bytes(base64.b64decode(found["data"]))
 
 
 def eventually(condition: Callable[[], Any], what: str, timeout: float = LONG) -> None:

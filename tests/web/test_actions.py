@@ -152,6 +152,7 @@ def test_a_page_publishes_once_and_at_a_rate(network: Network) -> None:
     robot.subscription("cmd_vel", Twist, receive)
     with pytest.raises(UsageError, match="read-only"):
         Sending(page, PagePolicy(read_only=True), "/cmd_vel", "geometry_msgs/Twist")
+    page.context.graph.wait_for_subscribers("/cmd_vel", 1, TIMEOUT)
     sending = Sending(page, PagePolicy(), "/cmd_vel", "geometry_msgs/Twist")
     sending.send("linear: {x: 1}")
     eventually(lambda: got == [1.0], "the message")
@@ -210,6 +211,7 @@ def test_driving_ends_when_the_browser_is_silent(network: Network) -> None:
             stopped.set()
 
     robot.subscription("cmd_vel", Twist, receive, queue_size=100)
+    page.context.graph.wait_for_subscribers("/cmd_vel", 1, TIMEOUT)
     driver = VelocityPublisher(page, PagePolicy(), "/cmd_vel")
     driver.drive(0.5, 0.0)
     assert stopped.wait(TIMEOUT)

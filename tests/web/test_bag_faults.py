@@ -50,17 +50,18 @@ def test_processes_that_stand_still_are_killed(bags: Bags, monkeypatch: pytest.M
     player = bags.playing
     assert player is not None
     eventually(lambda: player.last.paused, "the player", LONG)
-    monkeypatch.setattr("rosz.web.model.bags._SILENT_SECONDS", 2.0)
     for run in (second, player):
         os.kill(run._process.pid, signal.SIGSTOP)
-    for run in (second, player):
-        eventually(lambda run=run: run.silent, "its silence", LONG)  # type: ignore[misc]
-        assert fault_of(run) == "Its process does not respond; 'Stop' kills it."
-    bags.stop_recording()
-    bags.control(BagCommand("stop"))
-    for run in (second, player):
-        assert run.wait(LONG)
-        assert "did not respond" in fault_of(run)
+    with monkeypatch.context() as patch:
+        patch.setattr("rosz.web.model.bags._SILENT_SECONDS", 2.0)
+        for run in (second, player):
+            eventually(lambda run=run: run.silent, "its silence", LONG)  # type: ignore[misc]
+            assert fault_of(run) == "Its process does not respond; 'Stop' kills it."
+        bags.stop_recording()
+        bags.control(BagCommand("stop"))
+        for run in (second, player):
+            assert run.wait(LONG)
+            assert "did not respond" in fault_of(run)
     assert "rosz bag reindex" in second.fault
     finish(bags, recorded(bags, "third.mcap"))
     bags.close()

@@ -14,7 +14,17 @@ from rosz.msgs.std_msgs.msg import String
 from rosz.reconfigure import Client
 from rosz.web.pages.layout import ENTRIES
 
-from .robot import LONG, ROBOT, THEMES, World, eventually, open_browser, set_screen, take_picture
+from .robot import (
+    LONG,
+    ROBOT,
+    THEMES,
+    World,
+    eventually,
+    open_browser,
+    set_screen,
+    start_server,
+    take_picture,
+)
 
 pytestmark = [pytest.mark.system]
 
@@ -28,7 +38,7 @@ def world() -> Iterator[World]:
             robot.wait_for("ready", LONG)
             bags = network.folder / "bags"
             bags.mkdir()
-            server = network.run("-m", "rosz", "web", "--port", "0", "--bags", str(bags))
+            server = start_server(network, "--bags", str(bags))
             yield World(network, robot, server, browser)
     finally:
         network.close()

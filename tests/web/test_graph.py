@@ -12,11 +12,11 @@ LONG = 4 * TIMEOUT
 
 SERVER = """
 import sys
-import rosz.web.pages.graph as page
+from rosz import diagram
 from rosz.node import Node
 from rosz.web import PageSettings, open_page
 
-make_picture, write_svg, running = page.make_picture, page.write_svg, []
+make_picture, write_svg, running = diagram.make_picture, diagram.write_svg, []
 
 
 def names(picture):
@@ -38,7 +38,7 @@ def write_when_told(picture, *rest):
     return write_svg(picture, *rest)
 
 
-page.make_picture, page.write_svg = tell_what_is_made, write_when_told
+diagram.make_picture, diagram.write_svg = tell_what_is_made, write_when_told
 with Node("rosz_web_slow") as node:
     server, (address, *_) = open_page(node, PageSettings(port=0))
     print("the page is at", address, flush=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from network import Network, eventually
+from network import TIMEOUT, Network, eventually
 
 from rosz.access import PagePolicy
 from rosz.environment import Environment
@@ -128,6 +128,7 @@ def test_handles_are_drawn_and_moved(network: Network) -> None:
     assert np.allclose(handle["axis"], (0, 0, -1), atol=1e-6)
 
     eventually(update.subscribers, "the subscription")
+    page.context.graph.wait_for_subscribers("/h/feedback", 1, TIMEOUT)
     for one in (held("a", "down", 11.0), held("a", "move", 14.0)):
         display.take(one)
     assert cube_at(14.0)

@@ -10,7 +10,7 @@ from network import Network
 import rosz.bags
 from rosz.msgs.std_msgs.msg import String
 
-from .robot import LONG, World, eventually, open_browser
+from .robot import LONG, World, eventually, open_browser, start_server
 
 pytestmark = [pytest.mark.system]
 
@@ -40,7 +40,7 @@ def world() -> Iterator[World]:
             bags.mkdir()
             with rosz.bags.open(bags / "run.mcap", "w") as bag:
                 bag.write("/chatter", String("hello"), 1)
-            server = network.run("-m", "rosz", "web", "--port", "0", "--bags", str(bags))
+            server = start_server(network, "--bags", str(bags))
             robot.wait_for("ready", LONG)
             yield World(network, robot, server, browser)
     finally:

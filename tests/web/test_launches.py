@@ -16,7 +16,7 @@ from rosz.errors import LaunchError, UsageError
 from rosz.security import Permit
 from rosz.web.model import Launches, NodeOutput, RunningLaunch
 
-from .robot import LONG, World, eventually, open_browser, set_screen, take_picture
+from .robot import LONG, World, eventually, open_browser, set_screen, start_server, take_picture
 
 pytestmark = [pytest.mark.system]
 
@@ -140,7 +140,7 @@ def test_a_browser_restarts_a_node_and_follows_its_output(
 ) -> None:
     network = site.network
     with open_browser() as browser:
-        server = network.run("-m", "rosz", "web", "--port", "0")
+        server = start_server(network)
         world = World(network, site.program, server, browser)
         set_screen(browser, "laptop", "light")
         world.open("/")

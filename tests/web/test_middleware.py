@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import MutableMapping
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
@@ -174,7 +175,8 @@ def test_odd_cookies_are_not_the_right_one(cookie: str, path: str) -> None:
     assert request(middleware, {**HOME, "cookie": cookie}, path)[0] in {400, 401}
 
 
-def test_guessing_becomes_slow() -> None:
+def test_guessing_becomes_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PasswordGuesses.__init__, "__defaults__", (lambda: 100.0,))  # no pause ends
     middleware = AccessMiddleware("word", local=False)
     wrong = [request(middleware, HOME, "/?token=nope") for _ in range(20)]
     assert [status for status, *_ in wrong[:6]] == [401] * 5 + [429]
@@ -219,3 +221,22 @@ def test_guesses_of_a_network_count_together(addresses: str, other: str) -> None
         assert guesses.pause(address, False) == 0
     assert all(guesses.pause(address, True) for address in addresses.split())
     assert guesses.pause(other, True) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "raises"), [("No response returned.", False), ("another fault", True)]
+)
+def test_a_browser_that_left_is_no_fault(text: str, *, raises: bool) -> None:
+    async def fail(_scope: Scope, _receive: Receive, _send: Send) -> None:
+        raise RuntimeError(text)
+
+    async def run() -> None:
+        headers = [(b"host", HOME["host"].encode())]
+        scope = {"type": "http", "path": "/", "query_string": b"", "headers": headers}
+        await AccessMiddleware().protect(fail)(scope, _nothing, _nothing)
+
+    async def _nothing(*_: object) -> Any:  # nothing is received or sent
+        pytest.fail("no answer is due")
+
+    with pytest.raises(RuntimeError, match=text) if raises else nullcontext():
+        asyncio.run(run())

@@ -310,6 +310,8 @@ def test_tools_publish_what_rviz_publishes(network: Network) -> None:
     with pytest.raises(UsageError, match="read-only: it may not publish '/initialpose'"):
         Tools(page, PagePolicy(read_only=True)).take("estimate")
     tools = Tools(page, PagePolicy())
+    with page.context.graph.follow_all() as followed:
+        eventually(lambda: all(map(followed.view().subscriptions, topics)), "the subscriptions")
     for name, tool in TOOLS.items():
         tools.send(name, "map", (1.0, 2.0, 0.5), math.pi / 2)
         eventually(lambda topic=tool.topic: topic in got, tool.topic)  # type: ignore[misc]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from urllib.error import HTTPError
 
@@ -30,8 +30,10 @@ with Node("web") as node:
     server, (address, *_) = open_page(node, PageSettings(port=0, most_pages=int(sys.argv[1])))
     print("the page is at", address, flush=True)
     print("aiohttp is loaded:", "aiohttp" in sys.modules, flush=True)
-    sys.stdin.readline()
-    server.close()
+    from nicegui import core
+    for line in sys.stdin:
+        core.sio.eio.ping_timeout = float(line)
+        print("waits for answers", line, flush=True)
 """
 MOST = 5
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
@@ -45,6 +47,18 @@ class Pages:
         self.node = network.node("robot")
         self.server = server = network.program(SERVER, str(MOST))
         self.address = server.wait_for("the page is at", LONG).split()[-1]
+
+    @contextmanager
+    def waiting(self, seconds: int) -> Iterator[None]:
+        """Let the server wait for answers to its pings for some seconds rather than 20."""
+        self._wait_for_answers(seconds)
+        yield
+        self._wait_for_answers(20)
+
+    def _wait_for_answers(self, seconds: int) -> None:
+        before = len(self.server.lines)
+        self.server.say(f"{seconds}")
+        self.server.wait_for("waits for answers", after=before)
 
     def observed(self) -> bool:
         """Return whether a page observes the log."""
@@ -120,10 +134,11 @@ def test_one_that_is_busy(pages: Pages) -> None:
 
 def test_one_that_sleeps(pages: Pages) -> None:
     """A page whose browser reads nothing is closed, with what it observes; another one goes on."""
-    asleep = visit(pages, "/console", awake=False)
-    eventually(pages.observed, "the page to observe the log", LONG)
-    awake = visit(pages, "/services")
-    eventually(lambda: not pages.observed(), "the end of the page that sleeps", LONG)
+    with pages.waiting(6):
+        asleep = visit(pages, "/console", awake=False)
+        eventually(pages.observed, "the page to observe the log", LONG)
+        awake = visit(pages, "/services")
+        eventually(lambda: not pages.observed(), "the end of the page that sleeps", LONG)
     pages.node.service("late", Empty, lambda _: Empty.Response())
     awake.wait_for("/late")
     awake.close()

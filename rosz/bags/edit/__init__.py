@@ -1,7 +1,5 @@
 """Bags made of bags: filtered, converted, divided, repaired. May import the formats."""
 
-from __future__ import annotations
-
 from rosz.lazy import exports_of
 
 TYPE_CHECKING = False
@@ -16,10 +14,4 @@ if TYPE_CHECKING:
         rewrite,
     )
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "editing": "Transfer divide merged",
-            "repair": "Copied TypeDifference check_bag find_differences recover rewrite",
-        },
-    )
+    __getattr__ = exports_of(__name__)

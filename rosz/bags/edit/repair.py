@@ -155,18 +155,10 @@ def _compression_of(reader: BagReader) -> Compression:
     return max(compressions, key=compressions.count) if compressions else "none"
 
 
-def check_bag(path: Path) -> tuple[int, list[BagError]]:
-    """Read a whole bag.
-
-    Returns:
-        The number of readable messages, and the damaged parts.
-
-    Raises:
-        BagError: The bag cannot be read at all.
-    """
-    with open_reader(path) as reader:
-        problems = list(reader.problems)
-        count = sum(1 for _ in reader.messages(damaged=problems.append))
+def check_bag(reader: BagReader) -> tuple[int, list[BagError]]:
+    """Read a whole bag, and return the number of readable messages, and the damaged parts."""
+    problems = list(reader.problems)
+    count = sum(1 for _ in reader.messages(damaged=problems.append))
     return count, problems
 
 

@@ -1,7 +1,5 @@
 """Messages of bags as tables, pictures, videos and plots. May import introspect and images."""
 
-from __future__ import annotations
-
 from rosz.lazy import exports_of
 
 TYPE_CHECKING = False
@@ -10,11 +8,4 @@ if TYPE_CHECKING:
     from rosz.bags.export.plotting import check_format, draw, find_curves, read_curves
     from rosz.bags.export.tables import Tables, file_names
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "images": "IMAGE_TYPES ImageFiles Video VideoTimes",
-            "plotting": "check_format draw find_curves read_curves",
-            "tables": "Tables file_names",
-        },
-    )
+    __getattr__ = exports_of(__name__)

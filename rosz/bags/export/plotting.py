@@ -22,7 +22,6 @@ FORMATS = (".png", ".svg", ".pdf")
 _NS = 1_000_000_000
 _NUMBERS = frozenset({*SCALAR_CODES, "time", "duration"})
 _MOST_LINES = 32
-_COLON = re.compile(r":(?![^\[]*\])")
 _WIDTH, _HEIGHT = 10.0, 3.2
 
 
@@ -30,7 +29,7 @@ class Curve(msgspec.Struct):
     """The values of a field, or of its elements.
 
     Attributes:
-        lines: Times in seconds, and values, of each element; of the field itself under ``""``.
+        lines: Times in seconds and values: by element as ``" 0"``, or ``""`` for a single number.
         missing: Number of messages that have no such element.
     """
 
@@ -45,7 +44,7 @@ class Curve(msgspec.Struct):
         return f"{self.topic}/{self.path.text}"
 
     def add(self, time: float, message: Message) -> None:
-        """Add the value of a message; refuse so many elements that nobody could tell them apart."""
+        """Add the value of a message; raise `UsageError` if it has more than 32 elements."""
         try:
             value = self.path.read(message)
         except LookupError:
@@ -92,18 +91,11 @@ def find_curves(
             curve
             for part in re.split(r",(?![^\[]*\])", word)
             if part
-            for name in _spelled_out(part)
+            for name in FieldPath.spell_out(part)
             for curve in _curves(name, topics, load)
         ]
         for word in words
     ]
-
-
-def _spelled_out(word: str) -> list[str]:
-    """Return ``/a/x`` and ``/a/y`` for ``/a/x:y``."""
-    first, *others = _COLON.split(word)
-    before = first.rpartition("/")[0]
-    return [first, *(f"{before}/{other}" for other in others)]
 
 
 def _curves(name: str, topics: Mapping[str, Sequence[str]], load: Loader) -> list[Curve]:
@@ -120,13 +112,13 @@ def _curves(name: str, topics: Mapping[str, Sequence[str]], load: Loader) -> lis
 
 def _numbers_in(cls: type[Message], path: FieldPath) -> list[FieldPath]:
     """Return the paths of the numbers in a message; empty if the path leads to no message."""
-    part: Any = cls
+    kind: Any = cls
     for step in path.steps:
-        part = next((slot.kind for slot in slots(part) if slot.name == step.name), "")
-        if isinstance(part, str) or isinstance(step.index, slice):
+        kind = next((slot.kind for slot in slots(kind) if slot.name == step.name), "")
+        if isinstance(kind, str) or isinstance(step.index, slice):
             return []
-    fields = zip(part.__slots__, part._slot_types, strict=True)
-    return [FieldPath(f"{path.text}/{name}") for name, kind in fields if kind in _NUMBERS]
+    fields = zip(kind.__slots__, kind._slot_types, strict=True)
+    return [FieldPath(f"{path.text}/{name}") for name, type_name in fields if type_name in _NUMBERS]
 
 
 def read_curves(
@@ -168,7 +160,7 @@ def draw(axes: Sequence[Sequence[Curve]], file: Path, start: int, title: str = "
 
     Raises:
         NotFoundError: No curve has a value.
-        UsageError: The suffix is another one, or the library is missing.
+        UsageError: The suffix is not in `FORMATS`, or the library is missing.
         BagError: The file cannot be written.
     """
     check_format(file)

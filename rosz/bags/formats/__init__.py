@@ -1,7 +1,5 @@
 """The formats of bags: MCAP, that of ROS 1, and rosbag2."""
 
-from __future__ import annotations
-
 from rosz.lazy import exports_of
 
 TYPE_CHECKING = False
@@ -11,12 +9,4 @@ if TYPE_CHECKING:
     from rosz.bags.formats.rosbag2_writer import write_metadata
     from rosz.bags.formats.writing import removed_unfinished
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "ros1_form": "ros1_definition",
-            "ros1_reader": "Ros1Reader",
-            "rosbag2_writer": "write_metadata",
-            "writing": "removed_unfinished",
-        },
-    )
+    __getattr__ = exports_of(__name__)

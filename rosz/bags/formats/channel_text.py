@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 
 import msgspec
@@ -68,6 +69,7 @@ def profile_rows(profiles: Iterable[QoS], *, names: bool = False) -> list[dict[s
     return rows
 
 
+@lru_cache(maxsize=32)  # each chunk repeats its channels
 def parse_profiles(text: str) -> tuple[QoS, ...]:
     """Return the QoS of publishers from their text; unknown values have defaults.
 
@@ -77,7 +79,7 @@ def parse_profiles(text: str) -> tuple[QoS, ...]:
 
     try:
         rows = yaml.safe_load(text)
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError, RecursionError):
         return ()
     if not isinstance(rows, list):
         return ()
@@ -90,7 +92,7 @@ def _parse(row: dict[str, Any]) -> QoS:
         value = row.get(name)
         names = {code: policy for policy, code in codes.items()}
         policy = names.get(value) if isinstance(value, int) else value
-        if policy in codes:
+        if isinstance(policy, str) and policy in codes:
             given[name] = policy
     depth = row.get("depth")
     if isinstance(depth, int) and depth > 0:

@@ -1,7 +1,7 @@
 """Writing files of chunks, which MCAP and ROS 1's bags are.
 
-Messages are collected into a chunk. A full one is compressed and written at once, with no copy
-where it is not compressed. Flushed data are readable even if the process is killed or the disk is
+Messages are collected into a chunk. A full one is compressed and written at once; without
+compression it is not copied. Flushed data are readable even if the process is killed or the disk is
 full: a chunk that could not be written whole is cut off again.
 """
 
@@ -14,14 +14,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from rosz.bags.bag import (
-    SMALL,
-    Attachment,
-    Channel,
-    Compression,
-    FileErrors,
-    Payload,
-)
+from rosz.bags import bag
 from rosz.bags.formats.writing import BagUnfinished, mark_written
 from rosz.errors import BagError, ClosedError
 from rosz.lifecycle import Closing
@@ -31,13 +24,13 @@ _PIECES = 1000
 
 
 class FilledChunk:
-    """Records that are written together; `index` has stamp and place of each message, by handle."""
+    """Records that are written together; `index` has stamps and offsets of messages, by handle."""
 
     def __init__(self) -> None:
-        self.parts: list[Payload] = []
+        self.parts: list[bag.Payload] = []
         self.size = 0
         self.index: dict[int, array[int]] = {}
-        self._joined: bytearray | None = None  # the last part, if it takes more
+        self._joined: bytearray | None = None  # the last part, if more is appended to it
 
     @property
     def start(self) -> int:
@@ -54,17 +47,17 @@ class FilledChunk:
         self._join(record)
         self.size += len(record)
 
-    def add_message(self, head: bytes, data: Payload) -> None:
+    def add_message(self, head: bytes, data: bag.Payload) -> None:
         """Add a message; the payloads of large ones are not copied."""
         self._join(head)
-        if len(data) < SMALL:
+        if len(data) < bag.SMALL:
             self._join(data)
         else:
             self.parts.append(data)
             self._joined = None
         self.size += len(head) + len(data)
 
-    def _join(self, data: Payload) -> None:
+    def _join(self, data: bag.Payload) -> None:
         if self._joined is None:
             self._joined = bytearray()
             self.parts.append(self._joined)
@@ -74,7 +67,7 @@ class FilledChunk:
 class ChunkWriter(Closing):
     """A bag that is written in chunks; see `rosz.bags.BagWriter`. Several threads may use it.
 
-    A class for a format says what its records are.
+    The class of a format defines its records.
 
     Args:
         chunk_size: Bytes of messages that are written, and compressed, together.
@@ -83,15 +76,17 @@ class ChunkWriter(Closing):
 
     Attributes:
         complete: Whether the file has been closed with its index.
+        latest: Latest stamp that the format can hold; later ones become it.
     """
 
     format: str
+    latest = (1 << 64) - 1
 
     def __init__(
         self,
         path: str | os.PathLike[str],
         *,
-        compression: Compression = "none",
+        compression: bag.Compression = "none",
         chunk_size: int = 768 << 10,
         replace: bool = False,
         checksums: bool = True,
@@ -102,14 +97,14 @@ class ChunkWriter(Closing):
         self._compression = compression
         self._chunk_size = chunk_size
         flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | (os.O_TRUNC if replace else os.O_EXCL)
-        with FileErrors(path, "cannot create it"):
+        with bag.FileErrors(path, "cannot create it"):
             self._file = os.open(path, flags, 0o666)
         mark_written(self._file)
         self._lock = threading.Lock()
         self._error: BagError | None = None
         self._closed = False
         self._chunk = FilledChunk()
-        self._handles: dict[Channel, int] = {}
+        self._handles: dict[bag.Channel, int] = {}
         self._counts: dict[int, int] = {}
         self._offset = 0
         self._begun = False
@@ -121,12 +116,12 @@ class ChunkWriter(Closing):
         return self._offset + self._chunk.size
 
     @property
-    def written(self) -> int:
-        """Number of messages in the file."""
+    def message_count(self) -> int:
+        """Number of messages in the file, without those that wait for their chunk to be full."""
         return sum(self._counts.values())
 
-    def add(self, channel: Channel) -> int:
-        """Add a channel; one that equals an earlier one is the same."""
+    def add(self, channel: bag.Channel) -> int:
+        """Add a channel, and return its handle; equal channels share one."""
         with self._lock:
             handle = self._handles.get(channel)
             if handle is None:
@@ -138,10 +133,10 @@ class ChunkWriter(Closing):
             return handle
 
     def write(
-        self, handle: int, stamp: int, data: Payload, sent: int | None = None, sequence: int = 0
+        self, handle: int, stamp: int, data: bag.Payload, sent: int | None = None, sequence: int = 0
     ) -> None:
         """Write a message; see `rosz.bags.BagWriter.write`."""
-        size = len(data)
+        size, stamp = len(data), min(max(stamp, 0), self.latest)
         head = self._message_head(handle, stamp, size, stamp if sent is None else sent, sequence)
         with self._lock:
             self._check()
@@ -153,24 +148,24 @@ class ChunkWriter(Closing):
             index.append(chunk.size)
             chunk.add_message(head, data)
             if chunk.size >= self._chunk_size:
-                self._write_filled()
+                self._end_chunk()
 
     def add_metadata(self, name: str, texts: Mapping[str, str]) -> None:
         """Write named texts; a format that has none leaves them out."""
 
-    def add_attachment(self, attachment: Attachment) -> None:
+    def add_attachment(self, attachment: bag.Attachment) -> None:
         """Write a file into the bag; a format that has none leaves it out."""
 
     def flush(self) -> None:
         """Write everything so far to the file."""
         with self._lock:
             self._check()
-            self._write_filled()
+            self._end_chunk()
 
     def close(self) -> None:
         """Finish the file with its index.
 
-        The index is written even if messages could not be, as it may find room.
+        The index is written even if messages could not be: it may still fit on a full disk.
         """
         with self._lock:
             if self._closed:
@@ -178,7 +173,7 @@ class ChunkWriter(Closing):
             self._closed = True
             with suppress(BagError):
                 if self._error is None:
-                    self._write_filled()
+                    self._end_chunk()
             error = self._error
             try:
                 self._begin()
@@ -195,14 +190,14 @@ class ChunkWriter(Closing):
     # What a format defines.
 
     def _prepare(self, compression: str) -> None:
-        """Check the compression before the file is created, and make the format's own attributes.
+        """Check the compression, and set the attributes of the format, before the file is created.
 
         Raises:
             UsageError: The format has no such compression, or its library is missing.
         """
         raise NotImplementedError(compression)
 
-    def _define(self, handle: int, channel: Channel) -> None:
+    def _define(self, handle: int, channel: bag.Channel) -> None:
         """Add the records of a channel to the chunk."""
         raise NotImplementedError
 
@@ -211,7 +206,7 @@ class ChunkWriter(Closing):
         raise NotImplementedError
 
     def _header(self) -> bytes:
-        """Return the begin of the file."""
+        """Return the beginning of the file."""
         raise NotImplementedError
 
     def _write_chunk(self, chunk: FilledChunk) -> None:
@@ -223,7 +218,7 @@ class ChunkWriter(Closing):
         raise NotImplementedError
 
     def _finish(self) -> None:
-        """Change what stands at the begin of the file."""
+        """Change what stands at the beginning of the file."""
 
     # Writing.
 
@@ -233,8 +228,8 @@ class ChunkWriter(Closing):
         if self._closed:
             raise ClosedError(f"the bag '{self.path}' is closed")
 
-    def _write_filled(self) -> None:
-        """Write the chunk, if there are messages in it."""
+    def _end_chunk(self) -> None:
+        """Write the chunk, if there are messages in it, and start a new one."""
         chunk = self._chunk
         if chunk.index:
             self._chunk = FilledChunk()
@@ -244,12 +239,12 @@ class ChunkWriter(Closing):
                 self._counts[handle] += len(index) // 2
 
     def _begin(self) -> None:
-        """Write the begin of the file before anything else; it depends on the first channel."""
+        """Write the beginning of the file once; it may depend on the first channel."""
         if not self._begun:
             self._append(self._header())
             self._begun = True
 
-    def _append(self, *parts: Payload) -> None:
+    def _append(self, *parts: bag.Payload) -> None:
         """Write bytes to the file, all of them or none."""
         done = 0
         try:
@@ -264,7 +259,7 @@ class ChunkWriter(Closing):
             raise self._error from error
         self._offset += done
 
-    def _write_pieces(self, parts: list[Payload]) -> int:
+    def _write_pieces(self, parts: list[bag.Payload]) -> int:
         total = sum(map(len, parts))
         left = total
         while left:

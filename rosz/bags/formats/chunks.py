@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import bz2
 from collections.abc import Callable, Iterator
+from heapq import heappop, heappush
 from typing import Any, BinaryIO
 
 from rosz.bags.bag import Payload, compression_library
@@ -20,6 +21,8 @@ _RATIO = 10
 """Times what they have in the file that chunks may take in memory at least."""
 _MESSAGE_BYTES = 200
 """Bytes of memory that a message takes beside its payload."""
+_BYTES_OF_MESSAGE = 1000
+"""Bytes of the limit for each message that a file may have beside one for each of its bytes."""
 _FILE_RATIO = 100
 """Times its size that a compressed file may have at least; recorded data rarely reach it."""
 
@@ -46,52 +49,60 @@ def _check(what: str, size: int, limit: int) -> None:
 class HeldChunks:
     """The memory of chunks that overlap in time, whose messages wait for each other.
 
-    It may be some times what they have in the file, and twice the limit beside that.
+    It may be some times what they have in the file, and twice the limit beside that. All chunks
+    together may have a message for each byte of the file, and some beside that: recorded messages
+    take more.
 
     Args:
+        file_size: Bytes of the file.
         reverse: Whether the chunks come in the order of their ends, the latest first.
     """
 
-    def __init__(self, *, reverse: bool = False) -> None:
+    def __init__(self, file_size: int, *, reverse: bool = False) -> None:
         self._reverse = reverse
-        self._held: list[tuple[int, int, int]] = []  # start, end, bytes beyond what is allowed
+        self._held: list[tuple[int, int]] = []  # heap: until when, bytes beyond what is allowed
+        self._until = self._beyond = 0
+        self._messages = file_size + bag_limit() // _BYTES_OF_MESSAGE
 
     def room(self, start: int, end: int, packed: int, size: int) -> int:
         """Return how many messages a further chunk may have.
 
         Args:
-            start: Stamp of its earliest message.
-            end: Stamp of its latest message.
+            start: Stamp of its earliest message, or the chunk's place if chunks are not held.
+            end: Stamp of its latest message, or the same.
             packed: Its bytes in the file.
             size: Its bytes in memory.
 
         Raises:
             ChunkError: It finds no room.
         """
-        self._held = [
-            row for row in self._held if (row[0] <= end if self._reverse else row[1] >= start)
-        ]
-        beyond = size - _RATIO * packed
-        room = 2 * bag_limit() - beyond - sum(row[2] for row in self._held)
+        since, self._until = (-end, -start) if self._reverse else (start, end)
+        while self._held and self._held[0][0] < since:
+            self._beyond -= heappop(self._held)[1]
+        room = 2 * bag_limit() - self._beyond - (size - _RATIO * packed)
         if room < 0:
             raise ChunkError(
                 "chunks that overlap in time unpack to more than the limit of"
                 f" {bag_limit()} bytes (ROSZ_BAG_LIMIT)"
             )
-        self._held.append((start, end, beyond))
-        return room // _MESSAGE_BYTES
+        self._hold(size - _RATIO * packed)
+        return max(min(room // _MESSAGE_BYTES, self._messages), 0)
 
     def take(self, messages: int) -> None:
         """Count the messages of the last chunk."""
-        start, end, beyond = self._held[-1]
-        self._held[-1] = start, end, beyond + messages * _MESSAGE_BYTES
+        self._messages -= messages
+        self._hold(messages * _MESSAGE_BYTES)
+
+    def _hold(self, size: int) -> None:
+        self._beyond += size
+        heappush(self._held, (self._until, size))
 
 
 def too_many(messages: int) -> ChunkError:
     """Return the error of a chunk with more messages than it may have."""
     return ChunkError(
-        f"a small chunk has more than {messages} messages; the limit is {bag_limit()} bytes"
-        " (ROSZ_BAG_LIMIT)"
+        f"a chunk has more than {messages} messages, too many for the size of the file; the limit"
+        f" is {bag_limit()} bytes (ROSZ_BAG_LIMIT)"
     )
 
 

@@ -12,33 +12,15 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
 import msgspec
 
-from rosz.bags.bag import (
-    Attachment,
-    Channel,
-    Chunk,
-    DamageReport,
-    Entry,
-    FileErrors,
-    Payload,
-    in_order,
-    refuse_damage,
-)
+from rosz.bags import bag
 from rosz.bags.formats import mcap_records as mcap
 from rosz.bags.formats.chunks import ChunkError, HeldChunks, too_many
-from rosz.bags.formats.mcap_records import (
-    HEAD,
-    MAGIC,
-    MESSAGE,
-    Cursor,
-    DamagedRecord,
-    MissingSchema,
-    Op,
-)
 from rosz.bags.formats.writing import unindexed
 from rosz.errors import BagError
 from rosz.lifecycle import Closing
@@ -72,7 +54,7 @@ class _Span(msgspec.Struct):
     chunk: bool = True
 
 
-_Row: TypeAlias = tuple[int, int, Entry]
+_Row: TypeAlias = tuple[int, int, bag.Entry]
 """Stamp, place in the order of the file, message."""
 
 
@@ -97,14 +79,14 @@ class McapReader(Closing):
 
     def __init__(self, path: str | os.PathLike[str], *, scan: bool = False) -> None:
         self.path = Path(path)
-        with FileErrors(path, "cannot open it"):
+        with bag.FileErrors(path, "cannot open it"):
             self._file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         self._closed = False
         self.indexed = False
         self.start, self.end = 0, 0
         self.profile = ""
         self._schemas: dict[int, mcap.Schema] = {}
-        self._channels: dict[int, Channel] = {}
+        self._channels: dict[int, bag.Channel] = {}
         self._counts: Counter[int] = Counter()
         self._spans: list[_Span] = []
         self.metadata: dict[str, Mapping[str, str]] = {}
@@ -122,15 +104,15 @@ class McapReader(Closing):
         return os.fstat(self._file).st_size
 
     @property
-    def channels(self) -> Sequence[Channel]:
+    def channels(self) -> Sequence[bag.Channel]:
         """All channels, in the order of the file."""
         return list(dict.fromkeys(self._channels.values()))
 
     @property
-    def chunks(self) -> Sequence[Chunk]:
+    def chunks(self) -> Sequence[bag.Chunk]:
         """All chunks."""
         return [
-            Chunk(
+            bag.Chunk(
                 span.offset,
                 mcap.COMPRESSIONS.get(span.compression, "none"),
                 span.size,
@@ -142,13 +124,13 @@ class McapReader(Closing):
             if span.chunk
         ]
 
-    def count(self, channel: Channel | None = None) -> int:
+    def count(self, channel: bag.Channel | None = None) -> int:
         """Return the number of messages of a channel, or of all."""
-        if channel is None:
-            return self._counts.total()
-        return sum(
-            self._counts[number] for number, each in self._channels.items() if each == channel
-        )
+        return self._counts.total() if channel is None else self._totals[channel]
+
+    @cached_property
+    def _totals(self) -> Counter[bag.Channel]:
+        return bag.count_by_channel(self._counts, self._channels)
 
     def close(self) -> None:
         """Close the file; a second call has no effect."""
@@ -159,14 +141,14 @@ class McapReader(Closing):
     # The index.
 
     def _open(self, *, scan: bool) -> None:
-        if os.pread(self._file, len(MAGIC), 0) != MAGIC:
+        if os.pread(self._file, len(mcap.MAGIC), 0) != mcap.MAGIC:
             raise BagError("it does not begin as an MCAP file does", str(self.path), 0)
         if not scan:
             try:
                 self.indexed = self._read_summary()
-            except MissingSchema:
+            except mcap.MissingSchema:
                 pass  # the summary need not repeat schemas
-            except DamagedRecord as error:
+            except mcap.DamagedRecord as error:
                 self.problems.append(self._error(f"its index is damaged: {error}", -1))
         if not self.indexed:
             self._schemas, self._channels, self._counts = {}, {}, Counter()
@@ -187,7 +169,9 @@ class McapReader(Closing):
     def _read(self, offset: int, size: int) -> bytes:
         """Return bytes of the file; raise `DamagedRecord` if it has less."""
         if offset + size > self.size:
-            raise DamagedRecord(f"the file ends after {self.size} bytes, expected {offset + size}")
+            raise mcap.DamagedRecord(
+                f"the file ends after {self.size} bytes, expected {offset + size}"
+            )
         parts, left = [], size
         while left:
             try:
@@ -195,7 +179,7 @@ class McapReader(Closing):
             except OSError as error:
                 raise self._error(f"cannot read it: {error.strerror}", offset) from error
             if not part:
-                raise DamagedRecord(f"the file ends after {offset} bytes")
+                raise mcap.DamagedRecord(f"the file ends after {offset} bytes")
             parts.append(part)
             offset += len(part)
             left -= len(part)
@@ -204,28 +188,28 @@ class McapReader(Closing):
     def _footer(self) -> bytes:
         """Return the footer, and the end of the file; empty if it was not finished."""
         end = self.size - mcap.FOOTER_SIZE
-        tail = self._read(end, mcap.FOOTER_SIZE) if end >= len(MAGIC) else b""
-        whole = tail.endswith(MAGIC) and HEAD.unpack_from(tail) == (Op.FOOTER, 20)
+        tail = self._read(end, mcap.FOOTER_SIZE) if end >= len(mcap.MAGIC) else b""
+        whole = tail.endswith(mcap.MAGIC) and mcap.HEAD.unpack_from(tail) == (mcap.Op.FOOTER, 20)
         return tail if whole else b""
 
     def _read_summary(self) -> bool:
         """Read the index; return whether there is one."""
         tail = self._footer()
-        start, _, checksum = struct.unpack_from("<QQI", tail, HEAD.size) if tail else (0, 0, 0)
+        start, _, checksum = struct.unpack_from("<QQI", tail, mcap.HEAD.size) if tail else (0, 0, 0)
         if not start:
             return False
         end = self.size - mcap.FOOTER_SIZE
         if start > end:
-            raise DamagedRecord(f"it begins at byte {start}, and ends at byte {end}")
+            raise mcap.DamagedRecord(f"it begins at byte {start}, and ends at byte {end}")
         summary = self._read(start, end - start)
-        if checksum and zlib.crc32(tail[: HEAD.size + 16], zlib.crc32(summary)) != checksum:
-            raise DamagedRecord("its checksum is wrong")
+        if checksum and zlib.crc32(tail[: mcap.HEAD.size + 16], zlib.crc32(summary)) != checksum:
+            raise mcap.DamagedRecord("its checksum is wrong")
         statistics: tuple[int, ...] = ()
         kinds: Counter[int] = Counter()
         for op, body in mcap.records_in(summary):
             kinds[op] += 1
-            if op == Op.STATISTICS:
-                statistics = Cursor(body).fields(_STATISTICS)
+            if op == mcap.Op.STATISTICS:
+                statistics = mcap.Cursor(body).fields(_STATISTICS)
             self._index(op, body)
         # A summary need not repeat anything. The statistics tell whether all is there; if it is
         # not, or they are missing, or messages are in no chunk, the whole file is read.
@@ -235,41 +219,41 @@ class McapReader(Closing):
         return (
             self._counts.total() == messages
             and self._counts.keys() <= self._channels.keys()
-            and kinds[Op.CHANNEL] >= channels
-            and kinds[Op.ATTACHMENT_INDEX] >= attachments
-            and kinds[Op.METADATA_INDEX] >= metadata
-            and kinds[Op.CHUNK_INDEX] >= chunks
+            and kinds[mcap.Op.CHANNEL] >= channels
+            and kinds[mcap.Op.ATTACHMENT_INDEX] >= attachments
+            and kinds[mcap.Op.METADATA_INDEX] >= metadata
+            and kinds[mcap.Op.CHUNK_INDEX] >= chunks
             and bool(self._spans or not messages)
         )
 
     def _index(self, op: int, body: memoryview) -> None:
-        if op == Op.CHUNK_INDEX:
-            self._spans.append(_parse_chunk_index(Cursor(body)))
-        elif op == Op.STATISTICS:
-            cursor = Cursor(body)
+        if op == mcap.Op.CHUNK_INDEX:
+            self._spans.append(_parse_chunk_index(mcap.Cursor(body)))
+        elif op == mcap.Op.STATISTICS:
+            cursor = mcap.Cursor(body)
             *_, self.start, self.end = cursor.fields(_STATISTICS)
             for number, count in _COUNT.iter_unpack(cursor.take(cursor.u32() // 10 * 10)):
                 self._counts[number] = count
-        elif op == Op.METADATA_INDEX:
-            offset, length = Cursor(body).fields(_PLACE)
+        elif op == mcap.Op.METADATA_INDEX:
+            offset, length = mcap.Cursor(body).fields(_PLACE)
             (_, inner), *_ = mcap.records_in(self._read(offset, length))
             self._add_metadata(inner)
-        elif op == Op.ATTACHMENT_INDEX:
-            offset, length = Cursor(body).fields(_PLACE)
+        elif op == mcap.Op.ATTACHMENT_INDEX:
+            offset, length = mcap.Cursor(body).fields(_PLACE)
             self._attachments.append((offset, length))
         else:
             self._define(op, body)
 
     def _add_metadata(self, body: memoryview) -> None:
-        cursor = Cursor(body)
+        cursor = mcap.Cursor(body)
         name = cursor.text()
         self.metadata[name] = cursor.texts()
 
     def _define(self, op: int, body: memoryview) -> None:
-        if op == Op.SCHEMA:
+        if op == mcap.Op.SCHEMA:
             number, schema = mcap.parse_schema(body)
             self._schemas[number] = schema
-        elif op == Op.CHANNEL:
+        elif op == mcap.Op.CHANNEL:
             number, channel = mcap.parse_channel(body, self._schemas)
             self._channels[number] = channel
 
@@ -277,40 +261,41 @@ class McapReader(Closing):
 
     def _scan(self) -> None:
         """Find all spans, and count their messages."""
-        offset = len(MAGIC)
+        offset = len(mcap.MAGIC)
+        self._scanned = HeldChunks(self.size)
         run: _Span | None = None
         while offset < self.size:
             try:
                 op, length = self._head(offset)
-                if op in {Op.DATA_END, Op.FOOTER}:
+                if op in {mcap.Op.DATA_END, mcap.Op.FOOTER}:
                     return
-                if op in {Op.MESSAGE, Op.SCHEMA, Op.CHANNEL}:
+                if op in {mcap.Op.MESSAGE, mcap.Op.SCHEMA, mcap.Op.CHANNEL}:
                     run = self._extend(run, offset, op, length)
                 else:
                     run = None
                     self._scan_record(op, offset, length)
-            except DamagedRecord as error:
+            except mcap.DamagedRecord as error:
                 self.problems.append(
                     self._error(f"{error}; {self.size - offset} bytes are left out", offset)
                 )
                 return
-            offset += HEAD.size + length
+            offset += mcap.HEAD.size + length
 
     def _head(self, offset: int) -> tuple[int, int]:
-        op, length = HEAD.unpack(self._read(offset, HEAD.size))
-        if op not in _KINDS or offset + HEAD.size + length > self.size:
-            raise DamagedRecord(f"a record of kind {op} says that it has {length} bytes")
+        op, length = mcap.HEAD.unpack(self._read(offset, mcap.HEAD.size))
+        if op not in _KINDS or offset + mcap.HEAD.size + length > self.size:
+            raise mcap.DamagedRecord(f"a record of kind {op} says that it has {length} bytes")
         return op, length
 
     def _extend(self, run: _Span | None, offset: int, op: int, length: int) -> _Span | None:
         """Add a record that is in no chunk to a span, or begin one with it."""
-        whole = HEAD.size + length
-        if op != Op.MESSAGE:
-            self._define(op, memoryview(self._read(offset + HEAD.size, length)))
-        elif length < MESSAGE.size - HEAD.size:
-            raise DamagedRecord(f"a message has {length} bytes")
+        whole = mcap.HEAD.size + length
+        if op != mcap.Op.MESSAGE:
+            self._define(op, memoryview(self._read(offset + mcap.HEAD.size, length)))
+        elif length < mcap.MESSAGE.size - mcap.HEAD.size:
+            raise mcap.DamagedRecord(f"a message has {length} bytes")
         else:
-            _, _, number, _, stamp, _ = MESSAGE.unpack(self._read(offset, MESSAGE.size))
+            _, _, number, _, stamp, _ = mcap.MESSAGE.unpack(self._read(offset, mcap.MESSAGE.size))
             self._counts[number] += 1
             if run is None:
                 run = _Span(offset, 0, stamp, stamp, chunk=False)
@@ -323,81 +308,86 @@ class McapReader(Closing):
         return run
 
     def _scan_record(self, op: int, offset: int, length: int) -> None:
-        if op == Op.CHUNK:
+        if op == mcap.Op.CHUNK:
             self._scan_chunk(offset, length)
-        elif op == Op.METADATA:
-            self._add_metadata(memoryview(self._read(offset + HEAD.size, length)))
-        elif op == Op.ATTACHMENT:
-            self._attachments.append((offset, HEAD.size + length))
-        elif op == Op.HEADER:
-            self.profile = Cursor(self._read(offset + HEAD.size, length)).text()
+        elif op == mcap.Op.METADATA:
+            self._add_metadata(memoryview(self._read(offset + mcap.HEAD.size, length)))
+        elif op == mcap.Op.ATTACHMENT:
+            self._attachments.append((offset, mcap.HEAD.size + length))
+        elif op == mcap.Op.HEADER:
+            self.profile = mcap.Cursor(self._read(offset + mcap.HEAD.size, length)).text()
 
     def _scan_chunk(self, offset: int, length: int) -> None:
         """Add a chunk, and count its messages by the index behind it or by its records."""
-        head = Cursor(self._read(offset + HEAD.size, min(length, 100)))
+        head = mcap.Cursor(self._read(offset + mcap.HEAD.size, min(length, 100)))
         start, end, uncompressed, _ = head.fields(mcap.CHUNK_HEAD)
         compression = head.text()
         (size,) = head.fields(struct.Struct("<Q"))
-        span = _Span(offset, HEAD.size + length, start, end, compression, size, uncompressed)
-        counts = self._indexed_counts(offset + HEAD.size + length)
+        span = _Span(offset, mcap.HEAD.size + length, start, end, compression, size, uncompressed)
+        counts = self._indexed_counts(offset + mcap.HEAD.size + length)
         if not counts or not self._channels.keys() >= counts.keys():
             try:
                 data = self._load(span)
-                most = HeldChunks().room(start, end, size, uncompressed)
+                most = self._scanned.room(offset, offset, size, uncompressed)
                 counts = self._count_messages(data, most)
-            except (DamagedRecord, ChunkError) as error:
+            except (mcap.DamagedRecord, ChunkError) as error:
                 self.problems.append(self._error(str(error), offset))
                 return
         span.channels = frozenset(counts)
         self._counts += counts
         self._spans.append(span)
 
-    def _count_messages(self, data: Payload, most: int) -> Counter[int]:
+    def _count_messages(self, data: bag.Payload, most: int) -> Counter[int]:
         """Take the definitions among some records; return the number of messages by channel."""
         counts: Counter[int] = Counter()
         position = total = 0
-        while position < len(data):
-            op, length = mcap.head_at(data, position)
-            position += HEAD.size
-            if op == Op.MESSAGE:
-                counts[Cursor(data[position : position + 2]).u16()] += 1
+        try:
+            while position < len(data):
+                op, length = mcap.head_at(data, position)
+                position += mcap.HEAD.size
                 total += 1
                 if total > most:
                     raise too_many(most)
-            else:
-                self._define(op, memoryview(data)[position : position + length])
-            position += length
+                if op == mcap.Op.MESSAGE:
+                    counts[mcap.Cursor(data[position : position + 2]).u16()] += 1
+                else:
+                    self._define(op, memoryview(data)[position : position + length])
+                position += length
+        finally:
+            self._scanned.take(total)
         return counts
 
     def _indexed_counts(self, offset: int) -> Counter[int]:
         """Return the number of messages by channel as the records behind a chunk tell it."""
         counts: Counter[int] = Counter()
-        while offset + HEAD.size + 6 <= self.size:
-            op, length, number, size = struct.unpack("<BQHI", self._read(offset, HEAD.size + 6))
-            if op != Op.MESSAGE_INDEX or offset + HEAD.size + length > self.size:
+        while offset + mcap.HEAD.size + 6 <= self.size:
+            op, length, number, size = struct.unpack(
+                "<BQHI", self._read(offset, mcap.HEAD.size + 6)
+            )
+            if op != mcap.Op.MESSAGE_INDEX or offset + mcap.HEAD.size + length > self.size:
                 break
             counts[number] += size // 16
-            offset += HEAD.size + length
+            offset += mcap.HEAD.size + length
         return counts
 
     # Messages.
 
-    def _load(self, span: _Span) -> Payload:
+    def _load(self, span: _Span) -> bag.Payload:
         """Return the records of a span."""
         data = self._read(span.offset, span.length)
         if not span.chunk:
             return data
-        op, length = HEAD.unpack_from(data)
-        if op != Op.CHUNK or HEAD.size + length != span.length:
-            raise DamagedRecord("the index points to a place that has no chunk")
-        cursor = Cursor(data)
-        cursor.take(HEAD.size)
+        op, length = mcap.HEAD.unpack_from(data)
+        if op != mcap.Op.CHUNK or mcap.HEAD.size + length != span.length:
+            raise mcap.DamagedRecord("the index points to a place that has no chunk")
+        cursor = mcap.Cursor(data)
+        cursor.take(mcap.HEAD.size)
         _, _, uncompressed, checksum = cursor.fields(mcap.CHUNK_HEAD)
         name = cursor.text()
         (size,) = cursor.fields(struct.Struct("<Q"))
         plain = mcap.decompress(name, cursor.take(size), uncompressed)
         if checksum and zlib.crc32(plain) != checksum:
-            raise DamagedRecord("the checksum of the chunk is wrong")
+            raise mcap.DamagedRecord("the checksum of the chunk is wrong")
         return plain
 
     def messages(
@@ -407,8 +397,8 @@ class McapReader(Closing):
         end: int | None = None,
         *,
         reverse: bool = False,
-        damaged: DamageReport | None = None,
-    ) -> Iterator[Entry]:
+        damaged: bag.DamageReport | None = None,
+    ) -> Iterator[bag.Entry]:
         """Yield messages in the order of their stamps; see `rosz.bags.BagReader.messages`."""
         first = 0 if start is None else start
         last = mcap.LATEST if end is None else end
@@ -425,7 +415,7 @@ class McapReader(Closing):
             and (span.channels is None or not span.channels.isdisjoint(wanted))
         ]
 
-        held_chunks = HeldChunks(reverse=reverse)
+        held_chunks = HeldChunks(self.size, reverse=reverse)
 
         def rows_of(span: _Span) -> list[_Row]:
             rows: list[_Row] = []
@@ -434,23 +424,23 @@ class McapReader(Closing):
                 most = held_chunks.room(span.start, span.end, packed, span.uncompressed or packed)
                 data = self._load(span)
                 _collect(data, span.offset << 32, wanted, (first, last), rows, most)
-                held_chunks.take(len(rows))
-            except (DamagedRecord, ChunkError) as error:
-                (damaged or refuse_damage)(self._error(str(error), span.offset))
+            except (mcap.DamagedRecord, ChunkError) as error:
+                (damaged or bag.refuse_damage)(self._error(str(error), span.offset))
+            held_chunks.take(len(rows))
             return rows
 
-        return (row[2] for run in in_order(spans, rows_of, reverse=reverse) for row in run)
+        return (row[2] for run in bag.in_order(spans, rows_of, reverse=reverse) for row in run)
 
-    def attachments(self) -> Iterator[Attachment]:
+    def attachments(self) -> Iterator[bag.Attachment]:
         """Yield the files within the bag."""
         for offset, length in self._attachments:
             try:
                 yield _parse_attachment(self._read(offset, length))
-            except DamagedRecord as error:
+            except mcap.DamagedRecord as error:
                 raise self._error(str(error), offset) from error
 
 
-def _parse_chunk_index(cursor: Cursor) -> _Span:
+def _parse_chunk_index(cursor: mcap.Cursor) -> _Span:
     start, end, offset, length = cursor.fields(mcap.CHUNK_INDEX)
     places = cursor.take(cursor.u32())
     numbers = frozenset(number for number, _ in _COUNT.iter_unpack(places))
@@ -460,41 +450,41 @@ def _parse_chunk_index(cursor: Cursor) -> _Span:
     return _Span(offset, length, start, end, compression, size, uncompressed, numbers or None)
 
 
-def _parse_attachment(data: bytes) -> Attachment:
+def _parse_attachment(data: bytes) -> bag.Attachment:
     (_, body), *_ = mcap.records_in(data)
-    cursor = Cursor(body)
+    cursor = mcap.Cursor(body)
     stamp, _ = cursor.fields(_PLACE)
     name, media_type = cursor.text(), cursor.text()
     (size,) = cursor.fields(struct.Struct("<Q"))
     contents = bytes(cursor.take(size))
     checksum = zlib.crc32(body[: cursor.position])
     if cursor.u32() not in {0, checksum}:
-        raise DamagedRecord(f"the checksum of attachment '{name}' is wrong")
-    return Attachment(name, media_type, stamp, contents)
+        raise mcap.DamagedRecord(f"the checksum of attachment '{name}' is wrong")
+    return bag.Attachment(name, media_type, stamp, contents)
 
 
 def _collect(
-    data: Payload,
+    data: bag.Payload,
     order: int,
-    wanted: Mapping[int, Channel],
+    wanted: Mapping[int, bag.Channel],
     times: tuple[int, int],
     rows: list[_Row],
     most: int,
 ) -> None:
     """Add the messages among some records to a list, up to a record that is damaged."""
     first, last = times
-    size, head, position = len(data), MESSAGE.size, 0
-    kind, before, unpack = int(Op.MESSAGE), HEAD.size, MESSAGE.unpack_from
+    size, head, position = len(data), mcap.MESSAGE.size, 0
+    kind, before, unpack = int(mcap.Op.MESSAGE), mcap.HEAD.size, mcap.MESSAGE.unpack_from
     while position < size:
         if data[position] == kind and position + head <= size:
             _, length, number, sequence, stamp, sent = unpack(data, position)
             stop = position + before + length
             if stop > size or stop < position + head:
-                raise DamagedRecord(f"a message says that it has {length} bytes")
+                raise mcap.DamagedRecord(f"a message says that it has {length} bytes")
             channel = wanted.get(number)
             if channel is not None and first <= stamp <= last:
                 payload = data[position + head : stop]
-                entry = Entry(channel, stamp, payload, sent, sequence)
+                entry = bag.Entry(channel, stamp, payload, sent, sequence)
                 rows.append((stamp, order + position, entry))
                 if len(rows) > most:
                     raise too_many(most)

@@ -14,12 +14,7 @@ from collections.abc import Iterator, Mapping
 import msgspec
 
 from rosz.bags.bag import Channel, Compression, Payload, compression_library
-from rosz.bags.formats.channel_text import (
-    event_definition,
-    event_type,
-    format_profiles,
-    parse_profiles,
-)
+from rosz.bags.formats import channel_text
 from rosz.bags.formats.chunks import ChunkError, unpack
 from rosz.errors import RoszError
 from rosz.qos import LATCHED
@@ -182,12 +177,12 @@ def footer(summary: bytes, summary_start: int, offsets_start: int) -> bytes:
 
 def schema_body(number: int, channel: Channel) -> bytes:
     """Return the body of the schema of a channel."""
-    definition = event_definition(channel.type, channel.definition)
+    definition = channel_text.event_definition(channel.type, channel.definition)
     data = definition.encode("utf-8", "surrogateescape")
     language = channel.language or _LANGUAGES.get(channel.encoding, "") if data else ""
-    name = event_type(channel.type) or channel.type
+    name = channel_text.event_type(channel.type) or channel.type
     if channel.encoding == "ros1":
-        name = _ros1_name(channel.type)
+        name = channel.type.replace("/msg/", "/", 1)
     return _U16.pack(number) + text(name) + text(language) + _U32.pack(len(data)) + data
 
 
@@ -201,11 +196,11 @@ def parse_schema(body: Payload) -> tuple[int, Schema]:
 def channel_body(number: int, schema: int, channel: Channel) -> bytes:
     """Return the body of a channel's record; its texts have the names of ROS 1 and rosbag2."""
     about = {
-        "offered_qos_profiles": format_profiles(channel.qos),
+        "offered_qos_profiles": channel_text.format_profiles(channel.qos),
         "topic_type_hash": channel.type_hash,
         "callerid": channel.node,
         "md5sum": channel.md5,
-        _EVENT: channel.type if event_type(channel.type) else "",
+        _EVENT: channel.type if channel_text.event_type(channel.type) else "",
         "latching": "1" if channel.latched and channel.encoding == "ros1" else "",
     }
     about = {name: value for name, value in about.items() if value}
@@ -221,7 +216,7 @@ def parse_channel(body: Payload, schemas: Mapping[int, Schema]) -> tuple[int, Ch
     schema = schemas.get(schema_number, Schema("", "", b""))
     if schema_number and schema_number not in schemas:
         raise MissingSchema(f"channel '{topic}' has schema {schema_number}, which is not there")
-    qos = parse_profiles(about.get("offered_qos_profiles", ""))
+    qos = channel_text.parse_profiles(about.get("offered_qos_profiles", ""))
     if not qos and about.get("latching") in {"1", "true"}:
         qos = (LATCHED,)
     return number, Channel(
@@ -235,11 +230,6 @@ def parse_channel(body: Payload, schemas: Mapping[int, Schema]) -> tuple[int, Ch
         node=about.get("callerid", ""),
         language="" if schema.encoding == _LANGUAGES.get(encoding) else schema.encoding,
     )
-
-
-def _ros1_name(name: str) -> str:
-    package, _, base = name.partition("/msg/")
-    return f"{package}/{base}" if base else name
 
 
 def _ros2_name(name: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 import sys
 import zlib
-from array import array
 from collections.abc import Mapping
 
 from rosz.bags.bag import Attachment, Channel, compression_library
@@ -52,7 +51,7 @@ class McapWriter(ChunkWriter):
         self._chunk.add(record)
 
     def _message_head(self, handle: int, stamp: int, size: int, sent: int, sequence: int) -> bytes:
-        number = sequence & 0xFFFFFFFF
+        number, sent = sequence & 0xFFFFFFFF, max(sent, 0)  # whatever the publisher says
         return MESSAGE.pack(Op.MESSAGE, _MESSAGE_BODY + size, handle, number, stamp, sent)
 
     def add_metadata(self, name: str, texts: Mapping[str, str]) -> None:
@@ -70,7 +69,7 @@ class McapWriter(ChunkWriter):
     def _add_extra(self, op: int, body: bytes, about: bytes) -> None:
         with self._lock:
             self._check()
-            self._write_filled()
+            self._end_chunk()
             self._begin()
             offset, record = self._offset, mcap.record(op, body)
             self._append(record)
@@ -97,7 +96,9 @@ class McapWriter(ChunkWriter):
         head = mcap.HEAD.pack(Op.CHUNK, len(body) + size) + body
         indexes, places, position = [], [], self._offset + len(head) + size
         for handle, index in chunk.index.items():
-            data = _little_endian(index)
+            if sys.byteorder == "big":
+                index.byteswap()
+            data = index.tobytes()
             places.append(struct.pack("<HQ", handle, position))
             indexes.append(
                 mcap.record(Op.MESSAGE_INDEX, struct.pack("<HI", handle, len(data)) + data)
@@ -154,9 +155,3 @@ class McapWriter(ChunkWriter):
             self._end,
         )
         return numbers + struct.pack("<I", len(counts)) + counts
-
-
-def _little_endian(index: array[int]) -> bytes:
-    if sys.byteorder == "big":
-        index.byteswap()
-    return index.tobytes()

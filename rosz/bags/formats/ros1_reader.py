@@ -9,44 +9,18 @@ Damage is reported with its place, and the rest is read.
 from __future__ import annotations
 
 import os
+import re
 import struct
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import cast
 
 import msgspec
 
-from rosz.bags.bag import (
-    SMALL,
-    Attachment,
-    Channel,
-    Chunk,
-    Compression,
-    DamageReport,
-    Entry,
-    in_order,
-    refuse_damage,
-)
+from rosz.bags import bag
+from rosz.bags.formats import ros1_records as ros1
 from rosz.bags.formats.chunks import ChunkError, HeldChunks, too_many, unpack
-from rosz.bags.formats.ros1_records import (
-    LENGTH,
-    MAGIC,
-    OP_CHUNK,
-    OP_CHUNK_INFO,
-    OP_CONNECTION,
-    OP_INDEX,
-    OP_MESSAGE,
-    RecordError,
-    RecordHead,
-    describe_begin,
-    number,
-    read_fields,
-    read_head,
-    stamp,
-    text,
-)
 from rosz.environment import bag_limit
 from rosz.errors import BagError
 from rosz.idl import full_name
@@ -61,6 +35,12 @@ _CACHED_BYTES = 128 << 20
 """Bytes of them, from which only the newest stays."""
 _NS = 1_000_000_000
 _MESSAGE_MARK = b"op=\x02"
+_CHUNK_MARK = re.compile(rb".\0\0\0(?=.\0\0\0(?:op|compression|size)=)", re.DOTALL)
+"""Begin of a chunk's header, which is short; its fields may be in any order."""
+_LONGEST_MARK = 20
+_SEARCHED = 1 << 14
+"""Bytes that are searched at once for the next chunk."""
+_COMPRESSIONS: dict[str, bag.Compression] = {"none": "none", "bz2": "bz2", "lz4": "lz4"}
 
 _Place = tuple[int, int, int, int]
 """Stamp, rank of the connection, number of the chunk, and place in it: the order of messages."""
@@ -70,7 +50,7 @@ class BagConnection(msgspec.Struct, frozen=True):
     """One connection of a recorder to a publisher, and all fields that the publisher sent."""
 
     number: int
-    channel: Channel
+    channel: bag.Channel
     header: Mapping[str, bytes]
 
 
@@ -81,7 +61,7 @@ class _Chunk(msgspec.Struct):
     start: int
     end: int
     counts: dict[int, int]
-    head: RecordHead | None = None
+    head: ros1.RecordHead | None = None
 
 
 class Ros1Reader(Closing):
@@ -119,7 +99,9 @@ class Ros1Reader(Closing):
         except BaseException:
             self._file.close()
             raise
-        self.channels: Sequence[Channel] = [connection.channel for connection in self.connections]
+        self.channels: Sequence[bag.Channel] = [
+            connection.channel for connection in self.connections
+        ]
         counted = [chunk for chunk in self._chunks if chunk.counts]
         self.start: int = min((chunk.start for chunk in counted), default=0)
         self.end: int = max((chunk.end for chunk in counted), default=0)
@@ -128,17 +110,17 @@ class Ros1Reader(Closing):
 
     def _open(self) -> bool:
         """Read the index, or else the whole file; return whether there is an index."""
-        begin = self._read(0, len(MAGIC))
-        if begin != MAGIC:
-            raise BagError(describe_begin(begin), str(self.path), 0)
+        begin = self._read(0, len(ros1.MAGIC))
+        if begin != ros1.MAGIC:
+            raise BagError(ros1.describe_begin(begin), str(self.path), 0)
         try:
-            head = read_head(self._read, len(MAGIC), self.size)
-            how = text(head.fields, "encryptor", "")
-            place = number(head.fields, "index_pos", len(MAGIC))
+            head = ros1.read_head(self._read, len(ros1.MAGIC), self.size)
+            how = ros1.text(head.fields, "encryptor", "")
+            place = ros1.number(head.fields, "index_pos", len(ros1.MAGIC))
             if place and not how:
                 self._read_index(place, head)
                 return True
-        except RecordError as error:
+        except ros1.RecordError as error:
             self.problems.append(self._error(error))
             how = ""
         if how:
@@ -148,12 +130,13 @@ class Ros1Reader(Closing):
         self._scan()
         return False
 
-    def _read_index(self, place: int, head: RecordHead) -> None:
+    def _read_index(self, place: int, head: ros1.RecordHead) -> None:
         """Read the index at the end: the connections, and place and times of each chunk."""
         expected = tuple(
-            number(head.fields, name, len(MAGIC)) for name in ("conn_count", "chunk_count")
+            ros1.number(head.fields, name, len(ros1.MAGIC))
+            for name in ("conn_count", "chunk_count")
         )
-        connections: list[tuple[RecordHead, bytes, int]] = []
+        connections: list[tuple[ros1.RecordHead, bytes, int]] = []
         chunks: list[_Chunk] = []
         base, tail = place, self._read(place, max(self.size - place, 0))
 
@@ -161,17 +144,17 @@ class Ros1Reader(Closing):
             return tail[offset - base : offset - base + size]
 
         while place < self.size:
-            record = read_head(read, place, self.size)
+            record = ros1.read_head(read, place, self.size)
             data = read(record.data, record.end - record.data)
-            if record.op == OP_CONNECTION:
+            if record.op == ros1.OP_CONNECTION:
                 connections.append((record, data, place))
-            elif record.op == OP_CHUNK_INFO:
+            elif record.op == ros1.OP_CHUNK_INFO:
                 chunks.append(_chunk_info(record, data, place))
             else:
-                raise RecordError(f"a record of kind {record.op} in the index", place)
+                raise ros1.RecordError(f"a record of kind {record.op} in the index", place)
             place = record.end
         if (len(connections), len(chunks)) != expected:
-            raise RecordError(
+            raise ros1.RecordError(
                 f"an index of {len(connections)} connections and {len(chunks)} chunks, expected"
                 f" {expected[0]} and {expected[1]}",
                 place,
@@ -182,26 +165,27 @@ class Ros1Reader(Closing):
 
     def _scan(self) -> None:
         """Read through the file: find its chunks, and in them connections and messages."""
-        place = len(MAGIC)
+        place = len(ros1.MAGIC)
+        self._scanned = HeldChunks(self.size)
         while place < self.size:
             try:
-                head = read_head(self._read, place, self.size)
-                if head.op == OP_CHUNK:
+                head = ros1.read_head(self._read, place, self.size)
+                if head.op == ros1.OP_CHUNK:
                     head = self._begun(head)
                     self._scan_chunk(head, place)
-                elif head.op == OP_CONNECTION:
+                elif head.op == ros1.OP_CONNECTION:
                     data = self._read(head.data, head.end - head.data)
                     self._add_connection(head, data, place)
-            except RecordError as error:
+            except ros1.RecordError as error:
                 if not self.problems or self.problems[-1].offset != error.offset:
                     self.problems.append(self._error(error))
                 place = self._next_chunk(place + 1)
                 continue
-            if head.op == OP_CHUNK and head.end > self.size:
+            if head.op == ros1.OP_CHUNK and head.end > self.size:
                 return
             place = head.end
 
-    def _begun(self, head: RecordHead) -> RecordHead:
+    def _begun(self, head: ros1.RecordHead) -> ros1.RecordHead:
         """Return the head of a chunk; one of no bytes was not finished, and lasts to the end.
 
         ROS 1's recorder writes the size of a chunk when it is full.
@@ -209,65 +193,60 @@ class Ros1Reader(Closing):
         if head.end > head.data:
             return head
         try:
-            following = read_head(self._read, head.data, self.size).op
-        except RecordError:
-            following = OP_MESSAGE  # compressed ones
-        end = self.size if following in {OP_CONNECTION, OP_MESSAGE} else head.end
-        return RecordHead(head.op, head.fields, head.data, end)
+            following = ros1.read_head(self._read, head.data, self.size).op
+        except ros1.RecordError:
+            following = ros1.OP_MESSAGE  # compressed ones
+        end = self.size if following in {ros1.OP_CONNECTION, ros1.OP_MESSAGE} else head.end
+        return ros1.RecordHead(head.op, head.fields, head.data, end)
 
     def _next_chunk(self, place: int) -> int:
         """Return the place of the next chunk that begins behind a place; the size if none does."""
-        mark = b"compression="
         while place < self.size:
-            piece = self._read(place, 1 << 20)
-            found_at = piece.find(mark)
-            while found_at >= 0:
-                # The fields may be in any order, the header is short.
-                for back in range(8, 64):
-                    begin = place + found_at - back
-                    try:
-                        head = read_head(self._read, begin) if begin > 0 else None
-                    except RecordError:
-                        continue
-                    if head is not None and head.op == OP_CHUNK:
-                        return begin
-                found_at = piece.find(mark, found_at + 1)
-            place += max(len(piece) - len(mark), 1)
+            piece = self._read(place, _SEARCHED)
+            for match in _CHUNK_MARK.finditer(piece):
+                try:
+                    head = ros1.read_head(self._read, place + match.start())
+                except ros1.RecordError:
+                    continue
+                if head.op == ros1.OP_CHUNK:
+                    return place + match.start()
+            place += max(len(piece) - _LONGEST_MARK, 1)
         return self.size
 
-    def _scan_chunk(self, head: RecordHead, place: int) -> None:
+    def _scan_chunk(self, head: ros1.RecordHead, place: int) -> None:
         chunk = _Chunk(place, 0, 0, {}, head)
         stamps: list[int] = []
         problems: list[BagError] = []
         self._chunks.append(chunk)
         buffer = self._load(chunk, problems.append)
-        for when, connection, _ in self._walk(chunk, buffer, problems.append):
+        for when, connection, _ in self._walk(chunk, buffer, problems.append, self._scanned):
             stamps.append(when)
             chunk.counts[connection] = chunk.counts.get(connection, 0) + 1
+        self._scanned.take(len(stamps))
         if stamps:
             chunk.start, chunk.end = min(stamps), max(stamps)
         else:
             self._chunks.pop()
             self.problems += problems  # nothing of it is read later
 
-    def _add_connection(self, head: RecordHead, data: bytes, place: int) -> None:
-        key = number(head.fields, "conn", place)
+    def _add_connection(self, head: ros1.RecordHead, data: bytes, place: int) -> None:
+        key = ros1.number(head.fields, "conn", place)
         if key in self._ranks:
             return
-        header = read_fields(data, place)
-        topic = text(head.fields, "topic", "")
+        header = ros1.read_fields(data, place)
+        topic = ros1.text(head.fields, "topic", "")
         try:
-            channel = Channel(
+            channel = bag.Channel(
                 topic=topic,
-                type=full_name(text(header, "type"), "msg"),
+                type=full_name(ros1.text(header, "type"), "msg"),
                 encoding="ros1",
-                definition=text(header, "message_definition"),
-                md5=text(header, "md5sum"),
+                definition=ros1.text(header, "message_definition"),
+                md5=ros1.text(header, "md5sum"),
                 qos=(LATCHED if header.get("latching") == b"1" else QoS(),),
-                node=text(header, "callerid", ""),
+                node=ros1.text(header, "callerid", ""),
             )
         except KeyError as error:
-            raise RecordError(f"a connection to '{topic}' without {error}", place) from error
+            raise ros1.RecordError(f"a connection to '{topic}' without {error}", place) from error
         self._ranks[key] = len(self.connections)
         self.connections.append(BagConnection(key, channel, header))
 
@@ -275,7 +254,9 @@ class Ros1Reader(Closing):
 
     def _read(self, offset: int, size: int) -> bytes:
         """Return bytes from a place; fewer at the end of the file."""
-        size = max(min(size, self.size - offset), 0)
+        size = min(size, self.size - offset)
+        if size <= 0:
+            return b""
         try:
             data = os.pread(self._file.fileno(), size, offset)
             while 0 < len(data) < size and offset + len(data) < self.size:
@@ -284,15 +265,17 @@ class Ros1Reader(Closing):
             raise BagError(f"cannot be read: {error}", str(self.path), offset) from error
         return data
 
-    def _error(self, error: RecordError) -> BagError:
+    def _error(self, error: ros1.RecordError) -> BagError:
         return BagError(f"damaged: {error.reason}", str(self.path), error.offset)
 
-    def _head(self, chunk: _Chunk) -> RecordHead:
+    def _head(self, chunk: _Chunk) -> ros1.RecordHead:
         """Return the head of a chunk; raise `RecordError` if there is none at its place."""
         if chunk.head is None:
-            head = read_head(self._read, chunk.offset)
-            if head.op != OP_CHUNK:
-                raise RecordError(f"a record of kind {head.op}, expected a chunk", chunk.offset)
+            head = ros1.read_head(self._read, chunk.offset)
+            if head.op != ros1.OP_CHUNK:
+                raise ros1.RecordError(
+                    f"a record of kind {head.op}, expected a chunk", chunk.offset
+                )
             chunk.head = head
         return chunk.head
 
@@ -301,131 +284,133 @@ class Ros1Reader(Closing):
         head = self._head(chunk)
         return head.end - head.data
 
-    def _load(self, chunk: _Chunk, damaged: DamageReport) -> bytes:
+    def _load(self, chunk: _Chunk, damaged: bag.DamageReport) -> bytes:
         """Return the records of a chunk, as many as can be unpacked."""
         head = self._head(chunk)
         data = self._read(head.data, head.end - head.data)
         if len(data) < head.end - head.data:
-            cut = RecordError(
+            cut = ros1.RecordError(
                 f"a chunk of {head.end - head.data} bytes, but {len(data)} are left", chunk.offset
             )
             damaged(self._error(cut))
-        how = text(head.fields, "compression", "")
+        how = ros1.text(head.fields, "compression", "")
         if how == "none":
             return data
-        if how not in {"bz2", "lz4"}:
+        if how not in _COMPRESSIONS:
             reason = f"a chunk compressed by '{how}', expected none, bz2 or lz4"
-            raise RecordError(reason, chunk.offset)
+            raise ros1.RecordError(reason, chunk.offset)
         try:
-            size = number(head.fields, "size", chunk.offset)
+            size = ros1.number(head.fields, "size", chunk.offset)
             return unpack(how, data, size or bag_limit())
         except ChunkError as error:
             reason = str(error)
             if not size:
                 reason = f"a chunk was not finished; {len(error.sound)} bytes of it are left"
             if len(data) == head.end - head.data:
-                damaged(self._error(RecordError(reason, chunk.offset)))
+                damaged(self._error(ros1.RecordError(reason, chunk.offset)))
             return error.sound
 
-    def _buffer(self, number_: int, damaged: DamageReport) -> bytes:
+    def _buffer(self, number_: int, damaged: bag.DamageReport) -> bytes:
         """Return the records of a chunk; the newest few stay in memory."""
         buffer = self._buffers.get(number_)
         if buffer is None:
             buffer = self._load(self._chunks[number_], damaged)
             self._buffers[number_] = buffer
-            while len(self._buffers) > (_CACHED if self._cached_size() <= _CACHED_BYTES else 1):
+            cached = sum(map(len, self._buffers.values()))
+            while len(self._buffers) > (_CACHED if cached <= _CACHED_BYTES else 1):
                 self._buffers.popitem(last=False)
         else:
             self._buffers.move_to_end(number_)
         return buffer
 
-    def _cached_size(self) -> int:
-        return sum(map(len, self._buffers.values()))
-
     def _walk(
-        self, chunk: _Chunk, buffer: bytes, damaged: DamageReport
+        self, chunk: _Chunk, buffer: bytes, damaged: bag.DamageReport, budget: HeldChunks
     ) -> Iterator[tuple[int, int, int]]:
         """Yield stamp, connection and place of the messages of a chunk, record by record."""
         place = messages = 0
-        most = HeldChunks().room(chunk.start, chunk.end, self._packed(chunk), len(buffer))
+        most = budget.room(chunk.offset, chunk.offset, self._packed(chunk), len(buffer))
 
         def read(offset: int, size: int) -> bytes:
             return buffer[offset : offset + size]
 
         while place < len(buffer):
             try:
-                head = read_head(read, place, len(buffer))
-                if head.op == OP_CONNECTION:
+                head = ros1.read_head(read, place, len(buffer))
+                if head.op == ros1.OP_CONNECTION:
                     self._add_connection(head, buffer[head.data : head.end], place)
-                elif head.op == OP_MESSAGE:
+                elif head.op == ros1.OP_MESSAGE:
                     messages += 1
                     if messages > most:
-                        raise RecordError(str(too_many(most)), place)  # noqa: TRY301
-                    key = _connection_of(head, self._ranks, place)
-                    yield stamp(head.fields, "time", place), key, place
-            except RecordError as error:
+                        raise ros1.RecordError(str(too_many(most)), place)  # noqa: TRY301
+                    key = ros1.number(head.fields, "conn", place)
+                    if key not in self._ranks:
+                        reason = f"a message of an unknown connection {key}"
+                        raise ros1.RecordError(reason, place)  # noqa: TRY301
+                    yield ros1.stamp(head.fields, "time", place), key, place
+            except ros1.RecordError as error:
                 where = self._within(chunk, error.offset)
-                damaged(self._error(RecordError(error.reason + where[1], where[0])))
+                damaged(self._error(ros1.RecordError(error.reason + where[1], where[0])))
                 return
             place = head.end
 
     def _within(self, chunk: _Chunk, place: int) -> tuple[int, str]:
         """Return a place of a chunk as one in the file, with what else there is to say."""
         head = self._head(chunk)
-        if text(head.fields, "compression", "") == "none":
+        if ros1.text(head.fields, "compression", "") == "none":
             return head.data + place, ""
         return chunk.offset, f", at byte {place} of the decompressed chunk"
 
     # The contents.
 
     @cached_property
-    def chunks(self) -> Sequence[Chunk]:
+    def chunks(self) -> Sequence[bag.Chunk]:
         """The chunks whose heads can be read."""
-        listing: list[Chunk] = []
+        listing: list[bag.Chunk] = []
         for chunk in self._chunks:
             try:
                 head = self._head(chunk)
                 listing.append(
-                    Chunk(
+                    bag.Chunk(
                         offset=chunk.offset,
-                        compression=cast(Compression, text(head.fields, "compression", "")),
+                        compression=_COMPRESSIONS.get(
+                            ros1.text(head.fields, "compression", ""), "none"
+                        ),
                         size=head.end - head.data,
-                        uncompressed=number(head.fields, "size", chunk.offset),
+                        uncompressed=ros1.number(head.fields, "size", chunk.offset),
                         start=chunk.start,
                         end=chunk.end,
                     )
                 )
-            except RecordError:
+            except ros1.RecordError:
                 continue  # `messages` reports it
         return listing
 
-    def count(self, channel: Channel | None = None) -> int:
+    def count(self, channel: bag.Channel | None = None) -> int:
         """Return the number of messages of a channel, or of all."""
-        keys = {
-            connection.number
-            for connection in self.connections
-            if channel is None or connection.channel == channel
-        }
-        return sum(n for chunk in self._chunks for key, n in chunk.counts.items() if key in keys)
+        return self._totals.total() if channel is None else self._totals[channel]
 
-    def connection(self, channel: Channel) -> BagConnection:
+    @cached_property
+    def _totals(self) -> Counter[bag.Channel]:
+        numbers: Counter[int] = Counter()
+        for chunk in self._chunks:
+            numbers.update(chunk.counts)
+        channels = {each.number: each.channel for each in self.connections}
+        return bag.count_by_channel(numbers, channels)
+
+    def connection(self, channel: bag.Channel) -> BagConnection:
         """Return the connection of a channel of this reader."""
         return next(each for each in self.connections if each.channel is channel)
 
-    def stamps(self, channel: Channel) -> list[int]:
-        """Return the stamps of all messages of a channel by the index, sorted.
+    def stamps(self) -> Iterator[tuple[bag.Channel, int]]:
+        """Yield channel and stamp of all messages by the index, chunk by chunk.
 
         Raises:
             BagError: A part of the file is damaged.
         """
-        rank = next(n for n, each in enumerate(self.channels) if each is channel)
-        stamps: list[int] = []
-        for number_, chunk in enumerate(self._chunks):
-            if self.connections[rank].number in chunk.counts:
-                stamps += [
-                    place[0] for place in self._places(number_, {rank}, None, None, refuse_damage)
-                ]
-        return sorted(stamps)
+        ranks = range(len(self.connections))
+        for number_ in range(len(self._chunks)):
+            for when, rank, *_ in self._places(number_, ranks, None, None, bag.refuse_damage):
+                yield self.channels[rank], when
 
     def messages(
         self,
@@ -434,15 +419,15 @@ class Ros1Reader(Closing):
         end: int | None = None,
         *,
         reverse: bool = False,
-        damaged: DamageReport | None = None,
-        channels: Collection[Channel] | None = None,
-    ) -> Iterator[Entry]:
+        damaged: bag.DamageReport | None = None,
+        channels: Collection[bag.Channel] | None = None,
+    ) -> Iterator[bag.Entry]:
         """Yield messages in the order of their stamps; see `rosz.bags.BagReader.messages`.
 
         Messages of one stamp come in the order of their connections, as in ROS 1. ``channels``
         are channels of this reader, in place of topics.
         """
-        report = damaged or refuse_damage
+        report = damaged or bag.refuse_damage
         ranks = {
             rank
             for rank, channel in enumerate(self.channels)
@@ -458,7 +443,7 @@ class Ros1Reader(Closing):
             and (end is None or chunk.start <= end)
         ]
 
-        held_chunks = HeldChunks(reverse=reverse)
+        held_chunks = HeldChunks(self.size, reverse=reverse)
 
         def places(number_: int) -> list[_Place]:
             chunk = self._chunks[number_]
@@ -467,14 +452,14 @@ class Ros1Reader(Closing):
                 most = held_chunks.room(chunk.start, chunk.end, self._packed(chunk), 0)
                 if sum(chunk.counts.values()) > most:
                     raise too_many(most)
-            except (RecordError, ChunkError) as error:
-                report(self._error(RecordError(str(error), chunk.offset)))
+            except (ros1.RecordError, ChunkError) as error:
+                report(self._error(ros1.RecordError(str(error), chunk.offset)))
                 return []
             rows = self._places(number_, ranks, start, end, report)
             held_chunks.take(len(rows))
             return rows
 
-        return self._entries(in_order(spans, places, reverse=reverse), report)
+        return self._entries(bag.in_order(spans, places, reverse=reverse), report)
 
     def _places(
         self,
@@ -482,20 +467,21 @@ class Ros1Reader(Closing):
         ranks: Collection[int],
         start: int | None,
         end: int | None,
-        report: DamageReport,
+        report: bag.DamageReport,
     ) -> list[_Place]:
         """Return the places of the messages in a chunk: by its index, or else record by record."""
         chunk = self._chunks[number_]
         try:
             places = self._indexed_places(number_) if self.indexed else None
-        except RecordError as error:
+        except ros1.RecordError as error:
             report(self._error(error))
             places = None
         try:
             if places is None:
-                walked = self._walk(chunk, self._buffer(number_, report), report)
+                budget = HeldChunks(self.size)
+                walked = self._walk(chunk, self._buffer(number_, report), report, budget)
                 places = [(when, self._ranks[key], number_, at) for when, key, at in walked]
-        except RecordError as error:
+        except ros1.RecordError as error:
             report(self._error(error))
             return []
         low, high = start or 0, end if end is not None else 1 << 64
@@ -515,14 +501,16 @@ class Ros1Reader(Closing):
 
         places: list[_Place] = []
         for _ in chunk.counts:
-            head = read_head(read, place)
-            if head.op != OP_INDEX:
-                raise RecordError(f"a record of kind {head.op}, expected a chunk's index", place)
-            rank = self._ranks.get(number(head.fields, "conn", place))
+            head = ros1.read_head(read, place)
+            if head.op != ros1.OP_INDEX:
+                raise ros1.RecordError(
+                    f"a record of kind {head.op}, expected a chunk's index", place
+                )
+            rank = self._ranks.get(ros1.number(head.fields, "conn", place))
             data = read(head.data, head.end - head.data)
-            expected = number(head.fields, "count", place) * _INDEX_ENTRY.size
+            expected = ros1.number(head.fields, "count", place) * _INDEX_ENTRY.size
             if rank is None or not len(data) == head.end - head.data == expected:
-                raise RecordError("a chunk's index that does not fit it", place)
+                raise ros1.RecordError("a chunk's index that does not fit it", place)
             places += [
                 (seconds * _NS + nanoseconds, rank, number_, offset)
                 for seconds, nanoseconds, offset in _INDEX_ENTRY.iter_unpack(data)
@@ -530,9 +518,11 @@ class Ros1Reader(Closing):
             place = head.end
         return places
 
-    def _entries(self, runs: Iterator[list[_Place]], report: DamageReport) -> Iterator[Entry]:
+    def _entries(
+        self, runs: Iterator[list[_Place]], report: bag.DamageReport
+    ) -> Iterator[bag.Entry]:
         """Yield the messages at places."""
-        length = LENGTH.unpack_from
+        length = ros1.LENGTH.unpack_from
         channels = self.channels
         last, buffer, view, size = -1, b"", memoryview(b""), 0
         for run in runs:
@@ -540,7 +530,7 @@ class Ros1Reader(Closing):
                 if number_ != last:
                     try:
                         buffer = self._buffer(number_, report)
-                    except RecordError as error:
+                    except ros1.RecordError as error:
                         report(self._error(error))
                         buffer = b""
                     last, view, size = number_, memoryview(buffer), len(buffer)
@@ -554,18 +544,18 @@ class Ros1Reader(Closing):
                 if end > size or buffer.find(_MESSAGE_MARK, place, begin) < 0:
                     self._report_message(number_, place, report)
                     continue
-                source = buffer if end - begin < SMALL else view
-                yield Entry(channels[rank], when, source[begin + 4 : end])
+                source = buffer if end - begin < bag.SMALL else view
+                yield bag.Entry(channels[rank], when, source[begin + 4 : end])
 
-    def _report_message(self, number_: int, place: int, report: DamageReport) -> None:
+    def _report_message(self, number_: int, place: int, report: bag.DamageReport) -> None:
         chunk = self._chunks[number_]
-        if place < number(self._head(chunk).fields, "size", chunk.offset):
+        if place < ros1.number(self._head(chunk).fields, "size", chunk.offset):
             where, more = self._within(chunk, place)
         else:
             where, more = chunk.offset, f", at byte {place} of the chunk"
-        report(self._error(RecordError(f"no message where the index says{more}", where)))
+        report(self._error(ros1.RecordError(f"no message where the index says{more}", where)))
 
-    def attachments(self) -> Iterator[Attachment]:
+    def attachments(self) -> Iterator[bag.Attachment]:
         """Yield nothing: the format has no files within."""
         return iter(())
 
@@ -575,21 +565,13 @@ class Ros1Reader(Closing):
         self._buffers.clear()
 
 
-def _connection_of(head: RecordHead, numbers: Collection[int], place: int) -> int:
-    """Return the number of a message's connection."""
-    key = number(head.fields, "conn", place)
-    if key not in numbers:
-        raise RecordError(f"a message of an unknown connection {key}", place)
-    return key
-
-
-def _chunk_info(head: RecordHead, data: bytes, place: int) -> _Chunk:
-    count = number(head.fields, "count", place)
+def _chunk_info(head: ros1.RecordHead, data: bytes, place: int) -> _Chunk:
+    count = ros1.number(head.fields, "count", place)
     if len(data) != count * _COUNT.size:
-        raise RecordError(f"{len(data)} bytes about a chunk of {count} connections", place)
+        raise ros1.RecordError(f"{len(data)} bytes about a chunk of {count} connections", place)
     return _Chunk(
-        number(head.fields, "chunk_pos", place),
-        stamp(head.fields, "start_time", place),
-        stamp(head.fields, "end_time", place),
+        ros1.number(head.fields, "chunk_pos", place),
+        ros1.stamp(head.fields, "start_time", place),
+        ros1.stamp(head.fields, "end_time", place),
         dict(_COUNT.iter_unpack(data)),
     )

@@ -23,6 +23,7 @@ OP_CONNECTION = 7
 _LONGEST_HEAD = 1 << 20
 """Bytes; a connection's fields, with its definition, are data."""
 
+_NUMBER_SIZE = 8
 _STAMP = Struct("<II")
 
 Fields: TypeAlias = Mapping[str, bytes]
@@ -98,9 +99,9 @@ def read_fields(data: bytes, offset: int) -> dict[str, bytes]:
 
 
 def number(fields: Fields, name: str, offset: int) -> int:
-    """Return a field that is a number; raise `RecordError` if it does not exist."""
-    if name not in fields:
-        raise RecordError(f"a record without a field '{name}'", offset)
+    """Return a field that is a number; raise `RecordError` if there is none."""
+    if name not in fields or len(fields[name]) > _NUMBER_SIZE:
+        raise RecordError(f"a record without a number in its field '{name}'", offset)
     return int.from_bytes(fields[name], "little")
 
 

@@ -8,26 +8,18 @@ import struct
 from typing import Any
 
 from rosz.bags.bag import Channel, Payload, compression_library
+from rosz.bags.formats import ros1_records as ros1
 from rosz.bags.formats.chunk_writer import ChunkWriter, FilledChunk
-from rosz.bags.formats.ros1_records import (
-    LENGTH,
-    MAGIC,
-    OP_BAG,
-    OP_CHUNK,
-    OP_CHUNK_INFO,
-    OP_CONNECTION,
-    OP_INDEX,
-)
 from rosz.errors import BagError, UsageError
 
 _HEADER_SIZE = 4096
 """Bytes of the first record without its lengths; it is written again at the end."""
 _SECOND = 1_000_000_000
-_LATEST = (1 << 32) * _SECOND
+_LATEST = (1 << 32) * _SECOND - 1
 _STAMP = struct.Struct("<II")
 _INDEX = struct.Struct("<III")
 _U64 = struct.Struct("<Q")
-_VERSION = LENGTH.pack(1)
+_VERSION = ros1.LENGTH.pack(1)
 
 
 class Ros1Writer(ChunkWriter):
@@ -37,6 +29,7 @@ class Ros1Writer(ChunkWriter):
     """
 
     format = "rosbag"
+    latest = _LATEST
 
     def _prepare(self, compression: str) -> None:
         self._places: list[tuple[int, FilledChunk]] = []
@@ -67,24 +60,23 @@ class Ros1Writer(ChunkWriter):
         if channel.latched:
             texts["latching"] = "1"
         about = _fields(**{name: value.encode() for name, value in texts.items()})
-        head = {"op": bytes([OP_CONNECTION]), "conn": LENGTH.pack(handle)}
+        head = {"op": bytes([ros1.OP_CONNECTION]), "conn": ros1.LENGTH.pack(handle)}
         record = _record(about, **head, topic=channel.topic.encode())
         self._connections.append(record)
         self._chunk.add(record)
 
     def _message_head(self, handle: int, stamp: int, size: int, sent: int, sequence: int) -> bytes:
         del sent, sequence  # the format has no place for them
-        time = _STAMP.pack(*divmod(stamp, _SECOND)) if 0 <= stamp < _LATEST else bytes(8)
         return (
             b"\x26\0\0\0\x04\0\0\0op=\x02\x09\0\0\0conn="
-            + LENGTH.pack(handle)
+            + ros1.LENGTH.pack(handle)
             + b"\x0d\0\0\0time="
-            + time
-            + LENGTH.pack(size)
+            + _STAMP.pack(*divmod(stamp, _SECOND))
+            + ros1.LENGTH.pack(size)
         )
 
     def _header(self) -> bytes:
-        return MAGIC + _bag_record(0, 0, 0)
+        return ros1.MAGIC + _bag_record(0, 0, 0)
 
     def _write_chunk(self, chunk: FilledChunk) -> None:
         parts, size = chunk.parts, chunk.size
@@ -92,13 +84,13 @@ class Ros1Writer(ChunkWriter):
             packed = _compress(self._compression, b"".join(parts))
             parts, size = [packed], len(packed)
         head = _fields(
-            op=bytes([OP_CHUNK]),
+            op=bytes([ros1.OP_CHUNK]),
             compression=self._compression.encode(),
-            size=LENGTH.pack(chunk.size),
+            size=ros1.LENGTH.pack(chunk.size),
         )
         indexes = [_index_record(handle, index) for handle, index in chunk.index.items()]
         offset = self._offset
-        self._append(LENGTH.pack(len(head)), head, LENGTH.pack(size), *parts, *indexes)
+        self._append(ros1.LENGTH.pack(len(head)), head, ros1.LENGTH.pack(size), *parts, *indexes)
         chunk.parts = []
         self._places.append((offset, chunk))
 
@@ -109,28 +101,28 @@ class Ros1Writer(ChunkWriter):
     def _finish(self) -> None:
         head = _bag_record(self._index_place, len(self._connections), len(self._places))
         try:
-            os.pwrite(self._file, head, len(MAGIC))
+            os.pwrite(self._file, head, len(ros1.MAGIC))
         except OSError as error:
             reason = f"cannot write its index: {error.strerror}"
-            raise BagError(reason, str(self.path), len(MAGIC)) from error
+            raise BagError(reason, str(self.path), len(ros1.MAGIC)) from error
 
 
 def _fields(**fields: bytes) -> bytes:
     rows = (name.encode() + b"=" + value for name, value in fields.items())
-    return b"".join(LENGTH.pack(len(row)) + row for row in rows)
+    return b"".join(ros1.LENGTH.pack(len(row)) + row for row in rows)
 
 
 def _record(data: bytes, **fields: bytes) -> bytes:
     head = _fields(**fields)
-    return LENGTH.pack(len(head)) + head + LENGTH.pack(len(data)) + data
+    return ros1.LENGTH.pack(len(head)) + head + ros1.LENGTH.pack(len(data)) + data
 
 
 def _bag_record(index_place: int, connections: int, chunks: int) -> bytes:
     head = {
-        "op": bytes([OP_BAG]),
+        "op": bytes([ros1.OP_BAG]),
         "index_pos": _U64.pack(index_place),
-        "conn_count": LENGTH.pack(connections),
-        "chunk_count": LENGTH.pack(chunks),
+        "conn_count": ros1.LENGTH.pack(connections),
+        "chunk_count": ros1.LENGTH.pack(chunks),
     }
     return _record(b" " * (_HEADER_SIZE - len(_fields(**head))), **head)
 
@@ -138,21 +130,21 @@ def _bag_record(index_place: int, connections: int, chunks: int) -> bytes:
 def _index_record(handle: int, index: Any) -> bytes:
     rows = zip(index[::2], index[1::2], strict=True)
     data = b"".join(_INDEX.pack(*divmod(stamp, _SECOND), place) for stamp, place in rows)
-    head = {"ver": _VERSION, "conn": LENGTH.pack(handle)}
-    count = LENGTH.pack(len(data) // _INDEX.size)
-    return _record(data, op=bytes([OP_INDEX]), **head, count=count)
+    head = {"ver": _VERSION, "conn": ros1.LENGTH.pack(handle)}
+    count = ros1.LENGTH.pack(len(data) // _INDEX.size)
+    return _record(data, op=bytes([ros1.OP_INDEX]), **head, count=count)
 
 
 def _chunk_info(offset: int, chunk: FilledChunk) -> bytes:
     rows = [(handle, len(index) // 2) for handle, index in chunk.index.items()]
     return _record(
         b"".join(_STAMP.pack(*row) for row in rows),
-        op=bytes([OP_CHUNK_INFO]),
+        op=bytes([ros1.OP_CHUNK_INFO]),
         ver=_VERSION,
         chunk_pos=_U64.pack(offset),
         start_time=_STAMP.pack(*divmod(chunk.start, _SECOND)),
         end_time=_STAMP.pack(*divmod(chunk.end, _SECOND)),
-        count=LENGTH.pack(len(rows)),
+        count=ros1.LENGTH.pack(len(rows)),
     )
 
 

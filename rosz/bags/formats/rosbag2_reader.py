@@ -18,17 +18,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 from urllib.parse import quote
 
-from rosz.bags.bag import (
-    Attachment,
-    BagReader,
-    Channel,
-    Chunk,
-    Compression,
-    DamageReport,
-    Entry,
-    FileErrors,
-    refuse_damage,
-)
+from rosz.bags import bag
 from rosz.bags.formats.channel_text import parse_profiles
 from rosz.bags.formats.chunks import ChunkError, unpack_file, unpack_message
 from rosz.bags.formats.mcap_reader import McapReader
@@ -43,6 +33,12 @@ METADATA_RECORD = "rosbag2"
 _SUFFIXES = (".db3", ".mcap")
 _DAMAGE = (sqlite3.Error, ValueError)
 """Errors that the sqlite3 module raises for a damaged file; a ValueError if a text is damaged."""
+_COMPUTED = (
+    "SELECT name FROM sqlite_master WHERE type = 'view' OR type = 'table' AND rootpage = 0"
+    " UNION ALL SELECT t.name FROM sqlite_master AS t JOIN pragma_table_xinfo(t.name) AS c"
+    " WHERE t.type = 'table' AND c.hidden > 0"
+)
+"""Query for views, virtual tables, and tables with columns that are computed."""
 _ZSTD_FRAME = b"\x28\xb5\x2f\xfd"
 
 
@@ -51,7 +47,7 @@ class SqliteReader(Closing):
 
     format = "rosbag2"
     metadata: Mapping[str, Mapping[str, str]] = {}
-    chunks: Sequence[Chunk] = ()
+    chunks: Sequence[bag.Chunk] = ()
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
@@ -119,7 +115,7 @@ class SqliteReader(Closing):
         return sorted(rows)
 
     @property
-    def channels(self) -> Sequence[Channel]:
+    def channels(self) -> Sequence[bag.Channel]:
         """All channels, in the order of the file."""
         return list(self._channels.values())
 
@@ -129,7 +125,10 @@ class SqliteReader(Closing):
         except _DAMAGE as error:
             raise BagError(f"not a bag of rosbag2, or damaged: {error}", str(self.path)) from error
 
-    def _read_channels(self) -> dict[int, Channel]:
+    def _read_channels(self) -> dict[int, bag.Channel]:
+        for (name,) in self._rows(_COMPUTED):
+            reason = f"its '{name}' is computed, perhaps without end; expected a table of values"
+            raise BagError(reason, str(self.path))
         tables = {name for (name,) in self._rows("SELECT name FROM sqlite_master")}
         columns = [row[1] for row in self._rows("PRAGMA table_info(topics)")]
         definitions: dict[str, tuple[str, str]] = {}
@@ -149,7 +148,7 @@ class SqliteReader(Closing):
             if not (needed <= topic.keys() and all(isinstance(text, str | None) for text in texts)):
                 raise BagError("damaged: its table of topics", str(self.path))
             text, language = definitions.get(topic["type"], ("", ""))
-            channels[topic["id"]] = Channel(
+            channels[topic["id"]] = bag.Channel(
                 topic=topic["name"],
                 type=topic["type"],
                 encoding=topic["serialization_format"],
@@ -160,13 +159,13 @@ class SqliteReader(Closing):
             )
         return channels
 
-    def count(self, channel: Channel | None = None) -> int:
+    def count(self, channel: bag.Channel | None = None) -> int:
         """Return the number of messages of a channel, or of all."""
-        return sum(
-            number
-            for key, number in self._counts.items()
-            if channel is None or self._channels.get(key) == channel
-        )
+        return sum(self._counts.values()) if channel is None else self._totals[channel]
+
+    @cached_property
+    def _totals(self) -> Counter[bag.Channel]:
+        return bag.count_by_channel(self._counts, self._channels)
 
     def messages(
         self,
@@ -175,8 +174,8 @@ class SqliteReader(Closing):
         end: int | None = None,
         *,
         reverse: bool = False,
-        damaged: DamageReport | None = None,
-    ) -> Iterator[Entry]:
+        damaged: bag.DamageReport | None = None,
+    ) -> Iterator[bag.Entry]:
         """Yield messages in the order of their stamps; see `rosz.bags.BagReader`."""
         keys = [
             key
@@ -198,16 +197,16 @@ class SqliteReader(Closing):
         try:
             for key, stamp, data in self._database.execute(query, (*keys, *limits)):
                 if isinstance(data, bytes) and _is_stamp(stamp):
-                    yield Entry(self._channels[key], stamp, data)
+                    yield bag.Entry(self._channels[key], stamp, data)
                 else:
                     text = f"damaged: the message at {stamp} has no payload, or no time"
-                    (damaged or refuse_damage)(BagError(text, str(self.path)))
+                    (damaged or bag.refuse_damage)(BagError(text, str(self.path)))
         except _DAMAGE as error:
-            (damaged or refuse_damage)(BagError(f"damaged: {error}", str(self.path)))
+            (damaged or bag.refuse_damage)(BagError(f"damaged: {error}", str(self.path)))
 
     def _fetch(
-        self, rows: Iterable[tuple[int, int, int]], damaged: DamageReport | None
-    ) -> Iterator[Entry]:
+        self, rows: Iterable[tuple[int, int, int]], damaged: bag.DamageReport | None
+    ) -> Iterator[bag.Entry]:
         """Yield messages one by one, of a file that is damaged."""
         for stamp, key, place in rows:
             try:
@@ -216,11 +215,11 @@ class SqliteReader(Closing):
                 data = memoryview(data).tobytes()
             except (*_DAMAGE, TypeError) as error:
                 text = f"damaged: message {place}: {error}"
-                (damaged or refuse_damage)(BagError(text, str(self.path)))
+                (damaged or bag.refuse_damage)(BagError(text, str(self.path)))
             else:
-                yield Entry(self._channels[key], stamp, data)
+                yield bag.Entry(self._channels[key], stamp, data)
 
-    def attachments(self) -> Iterator[Attachment]:
+    def attachments(self) -> Iterator[bag.Attachment]:
         """Yield nothing: the format has no files within."""
         return iter(())
 
@@ -248,7 +247,7 @@ class Rosbag2Reader(Closing):
         compressed = str(metadata.get("compression_mode", "")).lower()
         self._compressed = compressed not in {"", "none"}
         self._by_message = compressed == "message" and metadata.get("compression_format") == "zstd"
-        self._parts: list[BagReader] = []
+        self._parts: list[bag.BagReader] = []
         try:
             for file in self._files(metadata):
                 self._open(file)
@@ -286,14 +285,16 @@ class Rosbag2Reader(Closing):
             # Older versions wrote the name of the folder too.
             paths = [self.path / str(name) for name in named]
             return [path if path.exists() else self.path / path.name for path in paths]
-        with FileErrors(self.path, "cannot open it"):
+        with bag.FileErrors(self.path, "cannot open it"):
             there = sorted(self.path.iterdir())
         return [file for file in there if file.suffix in (*_SUFFIXES, ".zstd")]
 
     def _open(self, file: Path) -> None:
         try:
             plain = self._decompress(file) if file.suffix == ".zstd" else file
-            part: BagReader = McapReader(plain) if plain.suffix == ".mcap" else SqliteReader(plain)
+            part: bag.BagReader = (
+                McapReader(plain) if plain.suffix == ".mcap" else SqliteReader(plain)
+            )
         except BagError as error:
             self.problems.append(error)
             return
@@ -320,7 +321,7 @@ class Rosbag2Reader(Closing):
         return "mcap" if self._parts[0].format == "mcap" else "sqlite3"
 
     @property
-    def compression(self) -> Compression:
+    def compression(self) -> bag.Compression:
         """The compression of the first chunk, or of the files or messages."""
         chunks = self._parts[0].chunks
         return "zstd" if self._compressed else chunks[0].compression if chunks else "none"
@@ -346,16 +347,16 @@ class Rosbag2Reader(Closing):
         return {**outer, **texts}
 
     @cached_property
-    def channels(self) -> Sequence[Channel]:
+    def channels(self) -> Sequence[bag.Channel]:
         """All channels, in the order of the files."""
         return list(dict.fromkeys(channel for part in self._parts for channel in part.channels))
 
     @property
-    def chunks(self) -> Sequence[Chunk]:
+    def chunks(self) -> Sequence[bag.Chunk]:
         """None: offsets would be those of several files."""
         return ()
 
-    def count(self, channel: Channel | None = None) -> int:
+    def count(self, channel: bag.Channel | None = None) -> int:
         """Return the number of messages of a channel, or of all."""
         return sum(part.count(channel) for part in self._parts)
 
@@ -366,8 +367,8 @@ class Rosbag2Reader(Closing):
         end: int | None = None,
         *,
         reverse: bool = False,
-        damaged: DamageReport | None = None,
-    ) -> Iterator[Entry]:
+        damaged: bag.DamageReport | None = None,
+    ) -> Iterator[bag.Entry]:
         """Yield messages in the order of their stamps; see `rosz.bags.BagReader`."""
         parts = [
             part.messages(topics, start, end, reverse=reverse, damaged=damaged)
@@ -376,9 +377,11 @@ class Rosbag2Reader(Closing):
         merged = heapq.merge(*parts, key=lambda entry: entry.stamp, reverse=reverse)
         if not self._by_message:
             return merged
-        return self._unpacked(merged, damaged or refuse_damage)
+        return self._unpacked(merged, damaged or bag.refuse_damage)
 
-    def _unpacked(self, entries: Iterable[Entry], damaged: DamageReport) -> Iterator[Entry]:
+    def _unpacked(
+        self, entries: Iterable[bag.Entry], damaged: bag.DamageReport
+    ) -> Iterator[bag.Entry]:
         """Yield messages that were compressed one by one."""
         for entry in entries:
             data = bytes(entry.data)
@@ -388,9 +391,9 @@ class Rosbag2Reader(Closing):
                 place = f"message of '{entry.channel.topic}' at {entry.stamp}"
                 damaged(BagError(f"damaged: {place}: {error}", str(self.path)))
             else:
-                yield Entry(entry.channel, entry.stamp, plain)
+                yield bag.Entry(entry.channel, entry.stamp, plain)
 
-    def attachments(self) -> Iterator[Attachment]:
+    def attachments(self) -> Iterator[bag.Attachment]:
         """Yield the files within the bag, which only those of MCAP have."""
         return chain.from_iterable(part.attachments() for part in self._parts)
 

@@ -16,15 +16,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from rosz.bags.bag import (
-    Attachment,
-    BagWriter,
-    Channel,
-    Compression,
-    FileErrors,
-    Payload,
-    compression_library,
-)
+from rosz.bags import bag
 from rosz.bags.formats.channel_text import format_profiles, profile_rows
 from rosz.bags.formats.mcap_reader import McapReader
 from rosz.bags.formats.mcap_writer import McapWriter
@@ -64,18 +56,18 @@ class _SqliteWriter(Closing):
 
     format = "rosbag2"
 
-    def __init__(self, path: Path, compression: Compression) -> None:
+    def __init__(self, path: Path, compression: bag.Compression) -> None:
         if compression not in {"none", "zstd"}:
             raise UsageError(
                 f"rosbag2's SQLite storage has no compression '{compression}'; it has zstd and none"
             )
         self._compress: Any = None
         if compression == "zstd":
-            self._compress = compression_library("zstd").ZstdCompressor(level=1).compress
+            self._compress = bag.compression_library("zstd").ZstdCompressor(level=1).compress
         self.path = path
-        self._rows: list[tuple[int, int, Payload]] = []
+        self._rows: list[tuple[int, int, bag.Payload]] = []
         self._waiting = self._written = 0
-        self._channels: list[Channel] = []
+        self._channels: list[bag.Channel] = []
         self._defined: set[str] = set()
         try:
             self._database = sqlite3.connect(path, check_same_thread=False)
@@ -94,7 +86,7 @@ class _SqliteWriter(Closing):
         except sqlite3.Error as error:
             raise BagUnfinished(str(error), str(self.path)) from error
 
-    def add(self, channel: Channel) -> int:
+    def add(self, channel: bag.Channel) -> int:
         self._channels.append(channel)
         handle = len(self._channels)
         qos = format_profiles(channel.qos, names=True).strip()
@@ -111,7 +103,7 @@ class _SqliteWriter(Closing):
         return handle
 
     def write(
-        self, handle: int, stamp: int, data: Payload, sent: int | None = None, sequence: int = 0
+        self, handle: int, stamp: int, data: bag.Payload, sent: int | None = None, sequence: int = 0
     ) -> None:
         del sent, sequence  # the format has no place for them
         packed = data if self._compress is None else self._compress(data)
@@ -131,7 +123,7 @@ class _SqliteWriter(Closing):
         query = "INSERT INTO metadata(metadata_version, metadata) VALUES (?, ?)"
         self._execute(query, [(_VERSION, row)])
 
-    def add_attachment(self, attachment: Attachment) -> None:
+    def add_attachment(self, attachment: bag.Attachment) -> None:
         """Leave it out: the format has no place for it."""
 
     def close(self) -> None:
@@ -155,26 +147,26 @@ class Rosbag2Writer(Closing):
         path: str | os.PathLike[str],
         *,
         storage: Storage = "mcap",
-        compression: Compression = "none",
+        compression: bag.Compression = "none",
     ) -> None:
         self.path = Path(path)
         self._storage = storage
         self._by_message = storage == "sqlite3" and compression == "zstd"
         self._lock = threading.Lock()
-        self._handles: dict[Channel, int] = {}
+        self._handles: dict[bag.Channel, int] = {}
         self._counts: dict[int, int] = {}
         self._custom: dict[str, str] = {}
         self._start, self._end = _LATEST, 0
         self._closed = False
         made = not self.path.exists()
-        with FileErrors(path, "cannot create it"):
+        with bag.FileErrors(path, "cannot create it"):
             self.path.mkdir(parents=True, exist_ok=True)
             if any(self.path.iterdir()):
                 raise BagError("cannot create it: the folder exists, and is not empty", str(path))
         suffix = ".mcap" if storage == "mcap" else ".db3"
         file = self.path / f"{self.path.absolute().name}_0{suffix}"
         try:
-            self._part: BagWriter = (
+            self._part: bag.BagWriter = (
                 McapWriter(file, compression=compression)
                 if storage == "mcap"
                 else _SqliteWriter(file, compression)
@@ -190,7 +182,7 @@ class Rosbag2Writer(Closing):
         """Bytes written so far, and those that wait for the disk."""
         return self._part.size
 
-    def add(self, channel: Channel) -> int:
+    def add(self, channel: bag.Channel) -> int:
         """Add a channel; one that differs from an earlier one in the node only is the same."""
         if channel.encoding == "ros1":
             raise BagError(
@@ -208,7 +200,7 @@ class Rosbag2Writer(Closing):
             return handle
 
     def write(
-        self, handle: int, stamp: int, data: Payload, sent: int | None = None, sequence: int = 0
+        self, handle: int, stamp: int, data: bag.Payload, sent: int | None = None, sequence: int = 0
     ) -> None:
         """Write a message; see `rosz.bags.BagWriter.write`."""
         with self._lock:
@@ -224,7 +216,7 @@ class Rosbag2Writer(Closing):
         else:
             self._custom |= {f"{name}/{key}": text for key, text in texts.items()}
 
-    def add_attachment(self, attachment: Attachment) -> None:
+    def add_attachment(self, attachment: bag.Attachment) -> None:
         """Write a file into the bag, which only MCAP can hold; SQLite leaves it out."""
         self._part.add_attachment(attachment)
 
@@ -268,7 +260,7 @@ class _Part(NamedTuple):
     name: str
     start: int
     end: int
-    counts: Mapping[Channel, int]
+    counts: Mapping[bag.Channel, int]
 
     @property
     def covered(self) -> dict[str, Any]:
@@ -281,7 +273,7 @@ class _Part(NamedTuple):
 
 def _describe(storage: Storage, parts: Sequence[_Part]) -> dict[str, Any]:
     """Return the metadata of a bag of some files."""
-    counts: dict[Channel, int] = {}
+    counts: dict[bag.Channel, int] = {}
     for part in parts:
         for channel, count in part.counts.items():
             counts[channel] = counts.get(channel, 0) + count
@@ -312,7 +304,7 @@ def write_metadata(folder: Path) -> None:
     parts: list[_Part] = []
     for file in sorted(folder.glob("*.mcap")):
         with McapReader(file) as reader:
-            counts: dict[Channel, int] = {}
+            counts: dict[bag.Channel, int] = {}
             for channel in reader.channels:
                 form = msgspec.structs.replace(channel, node="", md5="")
                 counts[form] = counts.get(form, 0) + reader.count(channel)
@@ -324,12 +316,12 @@ def _write_file(file: Path, information: Mapping[str, Any]) -> None:
     import yaml  # slow to import, and most bags do without
 
     whole = {"rosbag2_bagfile_information": information}
-    with FileErrors(file, "cannot write it"):
+    with bag.FileErrors(file, "cannot write it"):
         text = yaml.safe_dump(whole, sort_keys=False, allow_unicode=True)
         file.write_text(text, encoding="utf-8")
 
 
-def _topic_row(channel: Channel) -> dict[str, Any]:
+def _topic_row(channel: bag.Channel) -> dict[str, Any]:
     return {
         "name": channel.topic,
         "type": channel.type,

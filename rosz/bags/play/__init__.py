@@ -1,7 +1,5 @@
 """Playing bags. May import nodes and what edits bags."""
 
-from __future__ import annotations
-
 from rosz.bags.play.options import PlayOptions, Progress
 from rosz.bags.play.player import Player
 

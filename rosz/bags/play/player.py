@@ -18,12 +18,12 @@ from rosz.node import Node
 
 _NS = 1_000_000_000
 _FOREVER = threading.TIMEOUT_MAX / 2
-_LOOK_SECONDS = 0.1
+_REPORT_SECONDS = 0.1
 """Time between two reports of progress."""
-_RECENT = _NS
-"""A latched message this early in a bag is one that was published before the bag began."""
+_EARLY = _NS
+"""Latched messages of the first second of a bag were usually published before it began."""
 _BATCH = 256
-"""Messages that are published at once, before keys and new subscriptions are looked for."""
+"""Messages that ``immediate`` publishes between two looks for keys and new subscriptions."""
 
 
 class Player:
@@ -72,7 +72,7 @@ class Player:
             self._end = min(last, self._start + int(options.duration * _NS))
         self._changed = threading.Condition()
         self._steps = 0
-        self._target: int | None = None  # where to go on, in place of the next message
+        self._target: int | None = None  # stamp to jump to
         self._pace = Pace(self._start, options.rate, paused=options.paused)
         self._next_report = 0.0
         self._last = self._start
@@ -102,7 +102,7 @@ class Player:
             self._changed.notify_all()
 
     def step(self) -> None:
-        """Publish the next message of a pause."""
+        """Publish one message while paused."""
         with self._changed:
             if self._pace.paused:
                 self._steps += 1
@@ -119,7 +119,7 @@ class Player:
             self._changed.notify_all()
 
     def jump(self, elapsed: float) -> None:
-        """Go on from another place, in seconds since the start; a pause stays one.
+        """Go on from another place, in seconds since the start; a paused player stays paused.
 
         Latched messages from before that place are published first.
         """
@@ -129,7 +129,7 @@ class Player:
             self._changed.notify_all()
 
     def stop(self) -> None:
-        """End."""
+        """Stop playing."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -194,7 +194,7 @@ class Player:
                 if self._control is not None:
                     self._control.stamp = begin
             while self._options.keep_alive and not self._closed:
-                self._wait(_LOOK_SECONDS)
+                self._wait(_REPORT_SECONDS)
         finally:
             withdraw()
 
@@ -221,7 +221,7 @@ class Player:
             for batch in chain((some,), batches):
                 if not self._publish(batch):
                     return
-        self._look()
+        self._report_progress()
 
     def _play_at_once(self, entries: Iterator[Entry]) -> None:
         """Publish messages without waiting, but in a pause and for ``/clock``."""
@@ -234,12 +234,11 @@ class Player:
             if self._interrupted:
                 return
             if time.monotonic() >= self._next_report:
-                self._look()
+                self._report_progress()
 
     def _rush(self, entries: Iterable[Entry]) -> None:
         """Publish messages at once; those that nobody would receive are only counted."""
-        # What publishes the messages of each channel, and what converts them; None where nobody
-        # would receive them.
+        # By channel: the functions that publish and convert a message; None without a subscriber.
         routes: dict[int, tuple[Callable[[bytes], None], Callable[[Payload], bytes]] | None] = {}
         stamp, count = self._last, 0
         for entry in entries:
@@ -273,7 +272,7 @@ class Player:
         )
 
     def _publish(self, items: Iterable[Played]) -> bool:
-        """Publish messages when they are due; return False at the end of the node."""
+        """Publish messages when they are due; return False if a jump or the end interrupts it."""
         for stamp, publisher, payload in items:
             if not self._await(stamp, publisher.name) or self._interrupted:
                 return False
@@ -285,21 +284,21 @@ class Player:
                 self.outputs.report(text)
             self._last = stamp
             if not self.published & 255 and time.monotonic() >= self._next_report:
-                self._look()
+                self._report_progress()
         return not self._interrupted
 
     def _await(self, stamp: int, topic: str) -> bool:
-        """Wait until a message is due; return False at the end of the node, and to jump."""
+        """Wait until a message is due; return False if a jump or the end interrupts it."""
         pace, options = self._pace, self._options
         if topic in self.outputs.pausing and not pace.paused:
             pace.change(paused=True)
         if options.skip_empty and stamp - self._last > options.skip_empty * _NS:
             pace.jump(stamp)
         control = None if options.immediate else self._control
-        ahead = True
+        is_held = True
         while not self._interrupted:
-            ahead = ahead and control is not None and control.hold(pace)
-            if ahead:
+            is_held = is_held and control is not None and control.hold(pace)
+            if is_held:
                 left = _FOREVER
             elif pace.paused:
                 left = _FOREVER
@@ -320,15 +319,15 @@ class Player:
         return False
 
     def _wait(self, seconds: float) -> None:
-        """Wait, or until something changes, and report the progress."""
+        """Wait some seconds, or until something changes, and report the progress."""
         if time.monotonic() >= self._next_report:
-            self._look()
+            self._report_progress()
         with self._changed:
             if not self._interrupted:
-                self._changed.wait(min(seconds, _LOOK_SECONDS))
+                self._changed.wait(min(seconds, _REPORT_SECONDS))
 
-    def _look(self) -> None:
-        self._next_report = time.monotonic() + _LOOK_SECONDS
+    def _report_progress(self) -> None:
+        self._next_report = time.monotonic() + _REPORT_SECONDS
         stamp = max(self._last, min(self._pace.now(), self._end))
         self._report(
             Progress(
@@ -345,10 +344,10 @@ class Player:
     def _publish_latched(self, begin: int) -> None:
         """Publish latched messages from before a stamp.
 
-        With a pause at the start, those that were published before the bag began are such, too.
+        If the player starts paused, those of the first second of the bag count as earlier ones.
         """
         early = self._options.paused and not self._options.start and begin == self._start
-        end = begin + _RECENT if early else begin - 1
+        end = begin + _EARLY if early else begin - 1
         for reader in self._readers:
             for entry in reversed(list(self._last_latched(reader, end))):
                 item = self.outputs.convert(entry)

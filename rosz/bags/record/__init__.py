@@ -1,7 +1,5 @@
 """Recording topics and parameters into bags. May import nodes and the formats."""
 
-from __future__ import annotations
-
 from rosz.bags.record.parameters import ParameterRecord
 from rosz.bags.record.recorder import Recorder
 from rosz.bags.record.recording import BagFiles, Sink

@@ -57,7 +57,7 @@ class RecordedPublishers:
         """Follow the tokens of the publishers of a topic."""
         tokens = self._node.context.graph.follow_entities(Kind.PUBLISHER, topic)
         self._followed[topic] = self._node.keep(tokens)
-        tokens.listen(self._learn, history=False)
+        tokens.listen(self._learn)
 
     def find(self, topic: str, info: MessageInfo) -> RecordedPublisher:
         """Return the publisher of a message, which may come before its token."""

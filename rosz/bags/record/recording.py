@@ -10,7 +10,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from rosz.bags.bag import Channel, Payload
+from rosz.bags.bag import Channel, FileErrors, Payload
 from rosz.bags.opening import ACTIVE, create_file
 from rosz.bags.record.selection import RecordOptions
 from rosz.errors import BagError
@@ -131,8 +131,6 @@ class BagFiles(Closing):
         self._tracks: list[Track] = []
         self._index = count(first)
         self._start = 0
-        self._written = 0
-        self._count_before = 0  # messages in the bags before this one
         self._closed = False
         self._beginning = False
         self.finished: threading.Event = threading.Event()
@@ -154,10 +152,13 @@ class BagFiles(Closing):
     @property
     def unwritten(self) -> int:
         """Number of messages taken that no file has."""
-        return self.count - self._count_before - self._writer.written
+        return self.count - self._count_before - self._writer.message_count
 
-    def _open(self) -> None:
+    def _open(self, written: int = 0) -> None:
+        """Begin a bag after those that have so many bytes."""
         self._target, self._writer = _create(self._options, next(self._index))
+        self._written = written
+        self._count_before = self.count  # messages in the bags before this one
         self._report(f"Recording to '{self._target}'.")
         if self.begin is not None:
             self._beginning = True
@@ -225,22 +226,21 @@ class BagFiles(Closing):
             self.finished.set()
             return False
         self._finish()
-        self._written += self._writer.size
-        self._count_before = self.count
+        self._open(self.size)
         self._start = stamp
-        self._open()
         for track in self._tracks:
             if track.last is not None:
                 self._put(track, stamp, *track.last)
         most = self._options.max_splits
         while most and len(self.done) >= most:
             oldest = self.done.pop(0)
-            oldest.unlink(missing_ok=True)
+            with FileErrors(oldest, "cannot delete it"):
+                oldest.unlink(missing_ok=True)
             self._report(f"Deleted '{oldest}', the oldest of {most} bags.")
         return True
 
     def tick(self, now: int) -> None:
-        """Flush messages to the file, and end a bag whose time is over; see `Sink.tick`."""
+        """Flush messages to the file, and end the recording in time; see `Sink.tick`."""
         with self._lock:
             if self._closed:
                 return
@@ -263,13 +263,14 @@ class BagFiles(Closing):
             self._writer.close()
         except BagError:
             if self._writer.complete:
-                self._report(f"'{self._target}' has {self._writer.written} messages.")
+                self._report(f"'{self._target}' has {self._writer.message_count} messages.")
             raise
         finally:
-            if self._writer.complete:
+            if self._writer.complete and self._target not in self.done:
                 if self._target.exists():
                     raise BagError(f"'{self._target}' has appeared meanwhile", str(active))
-                active.rename(self._target)
+                with FileErrors(active, f"cannot rename it to '{self._target}'"):
+                    active.rename(self._target)
                 self.done.append(self._target)
 
 
@@ -290,7 +291,7 @@ def _create(options: RecordOptions, index: int) -> tuple[Path, ChunkWriter]:
                     active,
                     compression=options.compression,
                     chunk_size=options.largest_chunk,
-                    # They take longer than receiving and writing uncompressed messages.
+                    # Checksums take longer than receiving and writing uncompressed messages.
                     checksums=options.compression != "none",
                 )
     raise AssertionError  # count() has no end

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TypeAlias
 
+import msgspec
+
 from rosz.bridges.clients.settings import ClientLimits
 from rosz.errors import UsageError
 from rosz.worker import Worker
@@ -25,7 +27,7 @@ def task_worker(name: str) -> Worker[Task]:
     return Worker[Task](name, threads=_THREADS)
 
 
-class ClientTasks:
+class ClientTasks(msgspec.Struct, eq=False):
     """The tasks of one client: calls and goals.
 
     A few run at once and others wait for their turn, so that calls that do not end leave threads
@@ -36,19 +38,13 @@ class ClientTasks:
         limits: The limits on a client.
     """
 
-    def __init__(
-        self,
-        worker: Worker[Task],
-        limit: int,
-        limits: ClientLimits = ClientLimits(),  # noqa: B008  # frozen
-    ) -> None:
-        self._worker = worker
-        self._limit = limit
-        self._limits = limits
-        self._lock = threading.Lock()
-        self._size = 0
-        self._running = 0
-        self._waiting: deque[tuple[Task, int]] = deque()
+    _worker: Worker[Task]
+    _limit: int
+    _limits: ClientLimits = ClientLimits()
+    _lock: threading.Lock = msgspec.field(default_factory=threading.Lock)
+    _size: int = 0
+    _running: int = 0
+    _waiting: deque[tuple[Task, int]] = msgspec.field(default_factory=deque)
 
     def submit(self, task: Task, size: int) -> None:
         """Perform a task on a thread, when its turn comes.

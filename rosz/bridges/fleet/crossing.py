@@ -32,7 +32,6 @@ from rosz.wire import Kind, Token, entity_key, format_token, gid
 from rosz.worker import Worker
 
 _OFFERS: Final = (Kind.PUBLISHER, Kind.SERVICE)
-_SESSIONS: Final = 10_000
 _TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
 
 
@@ -76,7 +75,6 @@ class _Direction:
         self._outward = outward
         self.mark = mark_of(plan.prefix)
         self.ids = Ids()
-        self._zids: dict[str, str] = {}
         self.tokens: dict[str, Closable] = {}
         self.users: dict[tuple[Kind, str, bool], set[str]] = {}
         self.relays: dict[tuple[Kind, str, bool], list[Closable]] = {}
@@ -92,17 +90,10 @@ class _Direction:
         else:
             name = renamed
         namespace, _, base = self._node(token.node_name).rpartition("/")
-        zid = self._there(token.zid)
+        zid = foreign_id(self._plan.prefix, token.zid)
         return msgspec.structs.replace(
             token, zid=zid, namespace=namespace or "/", node=base, name=name
         )
-
-    def _there(self, zid: str) -> str:
-        foreign = foreign_id(self._plan.prefix, zid)
-        self._zids[foreign] = zid
-        while len(self._zids) > _SESSIONS:
-            del self._zids[next(iter(self._zids))]
-        return foreign
 
     def _name(self, kind: Kind, name: str) -> str | None:
         inside = name if self._outward else self._plan.inside(name)
@@ -138,7 +129,9 @@ class _Direction:
 
     def source_ids(self, key: str) -> str:
         """Return a key of the target with the session ids replaced by those of the source."""
-        return "/".join(self._zids.get(chunk, chunk) for chunk in key.split("/"))
+        sessions = {token.zid for token in self.source.graph.known().tokens}
+        zids = {foreign_id(self._plan.prefix, zid): zid for zid in sessions}
+        return "/".join(zids.get(chunk, chunk) for chunk in key.split("/"))
 
     def detection(self, key: str) -> str | None:
         """Return the end of the key of a latching publisher's token in the target.
@@ -150,7 +143,9 @@ class _Direction:
             The end in the target; ``None`` if the crossing itself has declared the token.
         """
         zid, _, rest = key.removeprefix("/@adv/pub/").partition("/")
-        return None if zid.startswith(self.mark) else f"/@adv/pub/{self._there(zid)}/{rest}"
+        if zid.startswith(self.mark):
+            return None
+        return f"/@adv/pub/{foreign_id(self._plan.prefix, zid)}/{rest}"
 
 
 class Crossing:

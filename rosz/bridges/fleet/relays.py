@@ -196,16 +196,17 @@ class TopicRelay:
 
     def _is_due(self, gid: bytes) -> bool:
         """Return whether the rate lets a sample of a publisher pass now."""
-        now, due = time.monotonic(), self._due.get(gid, 0.0)
-        if now < due:
-            return False
-        # A sample that is late by less than a period does not delay the samples after it.
-        self._due[gid] = (due if now - due < self._period else now) + self._period
+        now, due = time.monotonic(), self._due.pop(gid, 0.0)
+        passes = now >= due
+        if passes:
+            # A sample that is late by less than a period does not delay the samples after it.
+            due = (due if now - due < self._period else now) + self._period
+        self._due[gid] = due  # at the end: those at the beginning send no more
         while len(self._due) > _DEEPEST:
             oldest = next(iter(self._due))
             del self._due[oldest]
             self._sent.pop(oldest, None)
-        return True
+        return passes
 
     def close(self) -> None:
         """Stop passing samples; a second call has no effect."""

@@ -4,15 +4,6 @@
 extra ``rosz[foxglove]``.
 """
 
-from __future__ import annotations
-
 from rosz.bridges.assets import SHOWN
-from rosz.bridges.foxglove.client import CAPABILITIES
-from rosz.bridges.foxglove.server import (
-    PORT,
-    FoxgloveBridge,
-    FoxgloveLimits,
-    FoxgloveSettings,
-    Offer,
-    open_bridge,
-)
+from rosz.bridges.foxglove.client import CAPABILITIES, FoxgloveLimits
+from rosz.bridges.foxglove.server import PORT, FoxgloveBridge, FoxgloveSettings, Offer, open_bridge

@@ -78,18 +78,15 @@ class AdvertisedChannel(msgspec.Struct, frozen=True):
         }
 
 
-class _Listing:
+class _Listing(msgspec.Struct, eq=False):
     """The channels of either topics or services that clients were told of."""
 
-    def __init__(
-        self, op: str, member: str, describe: Callable[[AdvertisedChannel], dict[str, Any]]
-    ) -> None:
-        self._op = op
-        self._member = member
-        self._describe = describe
-        self._numbers = itertools.count(1)
-        self.channels: dict[_Key, AdvertisedChannel] = {}
-        self.by_number: dict[int, AdvertisedChannel] = {}
+    _op: str
+    _member: str
+    _describe: Callable[[AdvertisedChannel], dict[str, Any]]
+    _numbers: itertools.count[int] = msgspec.field(default_factory=partial(itertools.count, 1))
+    channels: dict[_Key, AdvertisedChannel] = msgspec.field(default_factory=dict)
+    by_number: dict[int, AdvertisedChannel] = msgspec.field(default_factory=dict)
 
     def add(self, key: _Key, kind: type[Any]) -> AdvertisedChannel:
         """Add a channel, with a new number."""
@@ -281,7 +278,7 @@ class NetworkCatalog:
         return self._policy.shows(objects, name) and (self._hidden or "/_" not in name)
 
 
-class RequestedTypes:
+class RequestedTypes(msgspec.Struct, eq=False):
     """Finds the classes of types, and requests unknown ones; used on one thread.
 
     Args:
@@ -290,19 +287,14 @@ class RequestedTypes:
         failed: Function called with the reason when a node does not describe a type.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        submit: Callable[[Callable[[], object]], object],
-        arrived: Callable[[], object],
-        failed: Callable[[str], object],
-    ) -> None:
-        self._node = node
-        self._submit = submit
-        self._arrived = arrived
-        self._failed = failed
-        self._worker = Worker[Callable[[], object]]("rosz-foxglove-types", threads=_REQUESTS)
-        self._classes: dict[tuple[str, str], type[Any] | None] = {}
+    _node: Node
+    _submit: Callable[[Callable[[], object]], object]
+    _arrived: Callable[[], object]
+    _failed: Callable[[str], object]
+    _worker: Worker[Callable[[], object]] = msgspec.field(
+        default_factory=partial(Worker, "rosz-foxglove-types", threads=_REQUESTS)
+    )
+    _classes: dict[tuple[str, str], type[Any] | None] = msgspec.field(default_factory=dict)
 
     def add(self, cls: type[Any]) -> None:
         """Add a type that a client has defined."""

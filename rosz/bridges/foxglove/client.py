@@ -11,18 +11,8 @@ from typing import Any
 import msgspec
 
 from rosz.access import AccessPolicy
+from rosz.bridges import clients
 from rosz.bridges.assets import Assets
-from rosz.bridges.clients import (
-    ClientLimits,
-    ClientTasks,
-    ClientTopics,
-    OutgoingQueue,
-    Task,
-    TopicMessage,
-    TopicQueue,
-    build,
-    pieces,
-)
 from rosz.bridges.foxglove import protocol
 from rosz.bridges.foxglove.catalog import AdvertisedChannel, NetworkCatalog
 from rosz.bridges.foxglove.parameters import ClientParameters
@@ -58,28 +48,36 @@ _ERROR = 2
 """Level of status messages about errors."""
 
 
+class FoxgloveLimits(clients.ClientLimits, frozen=True, kw_only=True):
+    """Limits on the number of clients and on their messages.
+
+    Attributes:
+        message: Largest size of a message that a client sends, in bytes.
+    """
+
+    message: int = 64 << 20
+
+
 class FoxgloveResources(msgspec.Struct, frozen=True):
     """The objects that all clients of a bridge share.
 
     Attributes:
         worker: Threads for calls and files, which may take long.
         session: Identification of this run of the bridge.
-        limit: Largest total size of the calls of a client that wait for a response, in bytes.
         limits: The limits on a client.
         offered: Features that the bridge offers.
     """
 
     node: Node
     policy: AccessPolicy
-    topics: ClientTopics[TopicMessage]
+    topics: clients.ClientTopics[clients.TopicMessage]
     catalog: NetworkCatalog
     parameters: ClientParameters
     services: CalledServices
     assets: Assets
-    worker: Worker[Task]
+    worker: Worker[clients.Task]
     session: str
-    limit: int
-    limits: ClientLimits
+    limits: FoxgloveLimits
     offered: tuple[str, ...] = CAPABILITIES
 
     @property
@@ -90,7 +88,7 @@ class FoxgloveResources(msgspec.Struct, frozen=True):
         return [*(feature for feature in self.offered if feature not in withheld), *time]
 
 
-class _ChannelQueue(TopicQueue[TopicMessage]):
+class _ChannelQueue(clients.TopicQueue[clients.TopicMessage]):
     """The messages that wait for one subscription of a client."""
 
     def __init__(self, subscription: int, channel: int) -> None:
@@ -103,7 +101,10 @@ class FoxgloveClient:
     """A client."""
 
     def __init__(
-        self, shared: FoxgloveResources, queue: OutgoingQueue[TopicMessage], name: str
+        self,
+        shared: FoxgloveResources,
+        queue: clients.OutgoingQueue[clients.TopicMessage],
+        name: str,
     ) -> None:
         self._shared = shared
         self._queue = queue
@@ -112,10 +113,10 @@ class FoxgloveClient:
         self._closed = False
         self._watched: dict[int, _ChannelQueue] = {}
         self._published: dict[int, tuple[str, Publisher[Any]]] = {}
-        self._tasks = ClientTasks(shared.worker, shared.limit, shared.limits)
+        self._tasks = clients.ClientTasks(shared.worker, shared.limits.message, shared.limits)
         self._files: deque[protocol.FetchAsset] = deque()
         self._file = b""
-        self._time: TopicQueue[TopicMessage] = TopicQueue(depth=1)
+        self._time: clients.TopicQueue[clients.TopicMessage] = clients.TopicQueue(depth=1)
         parameters, catalog = partial(shared.parameters.handle, self), shared.catalog
         self._handlers: dict[type[protocol.ClientMessage], tuple[str, Callable[[Any], None]]] = {
             protocol.SubscribeChannels: ("", self._subscribe),
@@ -174,7 +175,7 @@ class FoxgloveClient:
         return handler
 
     def encode(
-        self, message: TopicMessage, queue: TopicQueue[TopicMessage]
+        self, message: clients.TopicMessage, queue: clients.TopicQueue[clients.TopicMessage]
     ) -> bytes | Iterator[bytes | memoryview]:
         """Return a message of a topic as the bytes to send.
 
@@ -182,7 +183,9 @@ class FoxgloveClient:
             DecodeError: A message of ``/clock`` does not contain a time.
         """
         if isinstance(queue, _ChannelQueue):
-            return pieces(message.data, protocol.data_head(queue.subscription, message.received))
+            return clients.pieces(
+                message.data, protocol.data_head(queue.subscription, message.received)
+            )
         return protocol.time_frame(Clock.from_cdr(message.data).clock.to_nsec())
 
     def send(self, value: Mapping[str, Any]) -> None:
@@ -301,12 +304,12 @@ class FoxgloveClient:
             value = msgspec.json.decode(message.data)
         except (msgspec.MsgspecError, ValueError, RecursionError) as error:
             raise UsageError(f"a message for '{publisher.name}' is not JSON: {error}") from error
-        publisher.publish(build(cls, value, self._shared.node.now()))
+        publisher.publish(clients.build(cls, value, self._shared.node.now()))
 
     # Calls and files, which are handled on other threads.
 
     def _call(self, message: protocol.ServiceCall) -> None:
-        size = len(message.data) + self._shared.limit // _CALLS
+        size = len(message.data) + self._shared.limits.message // _CALLS
         try:
             self._tasks.submit(partial(self._call_now, message), size)
         except UsageError as error:
@@ -389,7 +392,7 @@ class CalledServices:
     def close(self) -> None:
         """Close the clients of all services."""
         with self._lock:
-            clients = [client for _, client in self._clients.values()]
+            called = list(self._clients.values())
             self._clients.clear()
-        for client in clients:
+        for _, client in called:
             client.close()

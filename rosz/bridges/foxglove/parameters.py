@@ -10,10 +10,12 @@ import binascii
 import datetime as dt
 from collections.abc import Callable, Collection, Iterable
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import msgspec
 
+from rosz.access import AccessPolicy
+from rosz.bridges.foxglove.catalog import CatalogMember
 from rosz.bridges.foxglove.protocol import (
     FoxgloveParameter,
     GetParameters,
@@ -22,13 +24,9 @@ from rosz.bridges.foxglove.protocol import (
     UnsubscribeParameterUpdates,
 )
 from rosz.errors import NotFoundError, RoszError, UsageError
+from rosz.node import Node
+from rosz.params.replica import Changed, Watch
 from rosz.worker import Worker
-
-if TYPE_CHECKING:
-    from rosz.access import AccessPolicy
-    from rosz.bridges.foxglove.catalog import CatalogMember
-    from rosz.node import Node
-    from rosz.params.replica import Changed, Watch
 
 ParameterRequest = (
     GetParameters | SetParameters | SubscribeParameterUpdates | UnsubscribeParameterUpdates

@@ -9,23 +9,14 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from rosz.access import ServerAccess
+from rosz.bridges import clients
 from rosz.bridges.assets import SHOWN, Assets
-from rosz.bridges.clients import (
-    BridgeSettings,
-    ClientLimits,
-    ClientTopics,
-    OutgoingQueue,
-    TopicMessage,
-    TopicQueue,
-    WebsocketServer,
-    place,
-    task_worker,
-)
 from rosz.bridges.foxglove.catalog import NetworkCatalog
 from rosz.bridges.foxglove.client import (
     CAPABILITIES,
     CalledServices,
     FoxgloveClient,
+    FoxgloveLimits,
     FoxgloveResources,
 )
 from rosz.bridges.foxglove.parameters import ClientParameters
@@ -48,17 +39,7 @@ _HOLDER = "foxglove"
 """Name of the clients in the rules of a machine."""
 
 _APPS = ("https://app.foxglove.dev", "https://app.foxglove.com")
-"""Origins of Foxglove in a browser. As a program, Foxglove has that of any file: ``file://``."""
-
-
-class FoxgloveLimits(ClientLimits, frozen=True, kw_only=True):
-    """Limits on the number of clients and on their messages.
-
-    Attributes:
-        message: Largest size of a message that a client sends, in bytes.
-    """
-
-    message: int = 64 << 20
+"""Origins of Foxglove in a browser; the Foxglove program has the origin of files, ``file://``."""
 
 
 class Offer(msgspec.Struct, frozen=True):
@@ -75,7 +56,7 @@ class Offer(msgspec.Struct, frozen=True):
     assets: tuple[re.Pattern[str], ...] = SHOWN
 
 
-class FoxgloveSettings(BridgeSettings, frozen=True, kw_only=True):
+class FoxgloveSettings(clients.BridgeSettings, frozen=True, kw_only=True):
     """Settings of a bridge; Foxglove's own pages may always connect.
 
     Attributes:
@@ -88,7 +69,7 @@ class FoxgloveSettings(BridgeSettings, frozen=True, kw_only=True):
     offer: Offer = Offer()
 
 
-class FoxgloveBridge(WebsocketServer[FoxgloveClient, TopicMessage]):
+class FoxgloveBridge(clients.WebsocketServer[FoxgloveClient, clients.TopicMessage]):
     """A server of the Foxglove protocol, whose clients take part in the network of a node.
 
     Args:
@@ -119,14 +100,13 @@ class FoxgloveBridge(WebsocketServer[FoxgloveClient, TopicMessage]):
         self._shared = FoxgloveResources(
             node,
             policy,
-            ClientTopics(node, TopicMessage),
+            clients.ClientTopics(node, clients.TopicMessage),
             lifecycle.keep(catalog),
             lifecycle.keep(ClientParameters(node, policy)),
             lifecycle.keep(CalledServices(node)),
             Assets(node.context.environment, offer.assets),
-            lifecycle.keep(task_worker("rosz-foxglove-calls")),
+            lifecycle.keep(clients.task_worker("rosz-foxglove-calls")),
             str(time.time_ns()),
-            limits.message,
             limits,
             offer.capabilities,
         )
@@ -149,10 +129,10 @@ class FoxgloveBridge(WebsocketServer[FoxgloveClient, TopicMessage]):
     def _client(
         self,
         websocket: ServerConnection,
-        queue: OutgoingQueue[TopicMessage],
+        queue: clients.OutgoingQueue[clients.TopicMessage],
         _refuse: Callable[[str], None],
     ) -> FoxgloveClient:
-        return FoxgloveClient(self._shared, queue, place(websocket))
+        return FoxgloveClient(self._shared, queue, clients.place(websocket))
 
     async def _receive(self, websocket: ServerConnection, client: FoxgloveClient) -> None:
         await self._run(client.open)
@@ -169,8 +149,8 @@ class FoxgloveBridge(WebsocketServer[FoxgloveClient, TopicMessage]):
         self,
         websocket: ServerConnection,
         client: FoxgloveClient,
-        message: TopicMessage,
-        topic: TopicQueue[TopicMessage],
+        message: clients.TopicMessage,
+        topic: clients.TopicQueue[clients.TopicMessage],
     ) -> None:
         try:
             frame = client.encode(message, topic)
@@ -181,7 +161,7 @@ class FoxgloveBridge(WebsocketServer[FoxgloveClient, TopicMessage]):
 
 
 def open_bridge(node: Node, settings: FoxgloveSettings) -> tuple[FoxgloveBridge, list[str]]:
-    """Return a bridge, and lines that say where it is.
+    """Return a bridge, and lines that tell the user its address.
 
     Args:
         node: Node of the bridge.

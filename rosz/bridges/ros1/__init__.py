@@ -4,7 +4,5 @@
 registrations. The others use sockets, nodes and the parameter store.
 """
 
-from __future__ import annotations
-
 from rosz.bridges.ros1.attach import AttachedBridge, CrossingNames
 from rosz.bridges.ros1.bridge import MASTER_PORT, MasterBridge, open_master, running_master

@@ -99,13 +99,13 @@ class MasterBridge(Closing):
         api = NodeApi(shared, self.port)
         self._registrations = Registrations(shared, self.port, self._on_changes)
         master = Master(shared, self._registrations, api.answer)
-        self._own = BridgedNode(shared.context, shared.name, lambda _reason: None)
-        self._lifecycle.keep(self._own)
+        self._bridge_node = BridgedNode(shared.context, shared.name, lambda _reason: None)
+        self._lifecycle.keep(self._bridge_node)
         self._mirror = api.mirror = Mirror(
-            shared, self._own, self._registrations.terminate, self._registrations.notify
+            shared, self._bridge_node, self._registrations.terminate, self._registrations.notify
         )
         self._lifecycle.keep(self._mirror)
-        self._file = environment.home / "rosz" / f"ros1_master_{self.port}.json"
+        self._state_file = environment.home / "rosz" / f"ros1_master_{self.port}.json"
         self._saving = False
         server.start(master.dispatch, self._mirror.accept)
         self._restore()
@@ -134,17 +134,17 @@ class MasterBridge(Closing):
     def _save(self) -> None:
         self._saving = False
         entries = self._registrations.entries()
-        new = self._file.with_suffix(".new")
+        new = self._state_file.with_suffix(".new")
         try:
-            self._file.parent.mkdir(parents=True, exist_ok=True)
+            self._state_file.parent.mkdir(parents=True, exist_ok=True)
             new.write_bytes(msgspec.json.encode(entries))
-            new.replace(self._file)
+            new.replace(self._state_file)
         except OSError as error:
-            log.warning("cannot save ROS 1's registrations in %s: %s", self._file, error)
+            log.warning("cannot save ROS 1's registrations in %s: %s", self._state_file, error)
 
     def _restore(self) -> None:
         """Register the nodes that the last master at this port stored and that still answer."""
-        entries = _read(self._file)
+        entries = _read(self._state_file)
         waiting = {(entry.node, entry.uri) for entry in entries}
         alive: set[tuple[str, str]] = set()
         lock = threading.Lock()

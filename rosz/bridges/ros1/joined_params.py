@@ -7,10 +7,10 @@ from functools import partial
 from typing import Any
 
 from rosz.access import NamePattern, matches_any
-from rosz.bridges.ros1.shared import BridgeResources
+from rosz.bridges.ros1.shared import BRIDGE, BridgeResources
 from rosz.bridges.ros1.sockets import log
 from rosz.errors import EncodeError, ParamNotFound, RoszError
-from rosz.params import leaves, normalise, split
+from rosz.params import DELETED, MISSING, Deleted, Draft, Value, leaves, lookup, normalise, split
 from rosz.params.replica import Changed
 from rosz.worker import Worker
 
@@ -23,6 +23,10 @@ _OWN_PARAMS = (RUN_ID, "/rosdistro", "/rosversion", "/roslaunch")
 
 class JoinedParameters:
     """Keeps the parameters of a master and of the network the same.
+
+    The values that both had last tell which side has changed since: the master may tell a change
+    late, when the network has a newer value. Everything but `changed` and `update` runs on the
+    thread of the worker.
 
     Args:
         worker: Thread on which the master is called.
@@ -45,6 +49,7 @@ class JoinedParameters:
         self._worker = worker
         self._call = call
         self._patterns = patterns
+        self._agreed: dict[str, Value] = {}
 
     def join(self, uri: str) -> None:
         """Make the parameters of both equal; where they differ, the master's count.
@@ -66,6 +71,7 @@ class JoinedParameters:
                 if params.lookup(path) != value:
                     changes.append((path, normalise(value, name)))
         params.write(changes, origin=shared.name)
+        self._agreed = normalise(tree)
         for name in params.names():
             there = shared.there(name)
             if there is not None and there not in values and self._crosses(there):
@@ -75,7 +81,7 @@ class JoinedParameters:
         own = any(name == each or name.startswith(f"{each}/") for each in _OWN_PARAMS)
         return not own and matches_any(self._patterns, name)
 
-    def _send(self, name: str, value: Any) -> None:
+    def _send(self, name: str, value: Value | None) -> None:
         try:
             if value is None:
                 self._call("deleteParam", name)
@@ -85,28 +91,48 @@ class JoinedParameters:
             log.warning("parameter '%s' stays here: %s", name, error)
         except RoszError as error:
             log.info("parameter '%s' is not set at the master: %s", name, error)
+        else:
+            self._agree(name, DELETED if value is None else value)
+
+    def _agree(self, name: str, value: Value | Deleted) -> None:
+        draft = Draft(self._agreed)
+        draft.change(split(name), value)
+        self._agreed = draft.root
 
     def changed(self, changed: Changed) -> None:
         """Pass a change on to the master; runs on the thread for watches."""
         name = self._shared.there(changed.name)
         if changed.origin != self._shared.name and name is not None and self._crosses(name):
-            self._worker.submit(partial(self._send_if_active, name, changed.new))
+            self._worker.submit(partial(self._pass_on, name, changed))
 
-    def _send_if_active(self, name: str, value: Any) -> None:
-        if self.active:
-            self._send(name, value)
+    def _pass_on(self, name: str, changed: Changed) -> None:
+        if not self.active:
+            return
+        if changed.origin.startswith(BRIDGE):  # nothing crosses two bridges
+            self._agree(name, DELETED if changed.new is None else changed.new)
+        else:
+            self._send(name, changed.new)
 
-    def update(self, key: str, value: Any) -> None:
+    def update(self, key: str, _value: Any) -> None:
         """Take a change of the master; runs on a thread of the server."""
-        name = f"/{key.strip('/')}"
+        self._worker.submit(partial(self._take, f"/{key.strip('/')}"))
+
+    def _take(self, name: str) -> None:
+        """Set a parameter to the master's present value, which may be newer than the one told."""
         if not self.active or not self._crosses(name):
             return
         params, here = self._shared.context.params, self._shared.here(name)
         try:
-            if value == {} and not self._call("hasParam", name):
+            there: Value | Deleted = DELETED
+            if self._call("hasParam", name):
+                there = normalise(self._call("getParam", name), name)
+            if _same(lookup(self._agreed, split(name)), MISSING if there is DELETED else there):
+                return
+            self._agree(name, there)
+            if there is DELETED:
                 params.delete(here, origin=self._shared.name)
-            elif not _same(params.lookup(split(here)), value):  # else it could go round a ring
-                params.set(here, value, origin=self._shared.name)
+            elif not _same(params.lookup(split(here)), there):  # else it could go round a ring
+                params.set(here, there, origin=self._shared.name)
         except ParamNotFound:
             return
         except RoszError as error:

@@ -1,7 +1,6 @@
 """The port of a bridge: XML-RPC and TCPROS on one, told apart by their first bytes.
 
-A call begins with ``POST``, which as the length of a connection header would be more than is
-allowed.
+A call begins with ``POST``: read as the length of a connection header, that exceeds the limit.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ _PAUSE = 1.0
 _MAX_REPORTED = 1000
 _PIECE = 1 << 16
 _MAX_HELD = 256 << 20
-"""Bytes of calls and headers that have not been answered yet, of all connections together."""
+"""Largest number of bytes of unanswered calls and headers, of all connections together."""
 
 
 class Ros1Server:
@@ -53,7 +52,7 @@ class Ros1Server:
 
     def __init__(self, loop: SocketLoop, host: str, port: int) -> None:
         self.loop = loop
-        # For all connections: one at a time is read, and nothing of it stays there.
+        # One buffer for all connections: what is read is handled before the next read.
         self.piece = bytearray(_PIECE)
         self.dispatch: Dispatch
         self.connect: Callable[[Incoming, dict[str, str]], object]
@@ -76,7 +75,7 @@ class Ros1Server:
     def start(
         self, dispatch: Dispatch, connect: Callable[[Incoming, dict[str, str]], object]
     ) -> None:
-        """Take connections from now on.
+        """Accept connections from now on.
 
         Args:
             dispatch: Function that returns the result of a call, on a thread of the server; a
@@ -84,7 +83,7 @@ class Ros1Server:
             connect: Function called with a connection and its header, on the thread of the loop.
         """
         self.dispatch, self.connect = dispatch, connect
-        self.loop.call(lambda: self._follow(selectors.EVENT_READ))
+        self.loop.call(lambda: self._watch_socket(selectors.EVENT_READ))
 
     def close(self) -> None:
         """Close the port and all connections; a second call has no effect."""
@@ -92,16 +91,16 @@ class Ros1Server:
         self.loop.call(self._close)
 
     def report(self, text: str) -> None:
-        """Log a warning, unless it has been logged: programs that are refused try again."""
+        """Log a warning once, since refused programs try again."""
         if text not in self._reported and len(self._reported) < _MAX_REPORTED:
             self._reported.add(text)
             log.warning("%.500s (told once)", text)
 
     def hold(self, count: int) -> None:
-        """Count bytes of requests that are held from now on, or, if negative, no more.
+        """Add to the number of bytes of unanswered requests; a negative count subtracts.
 
         Raises:
-            TransportError: These would be too many.
+            TransportError: The number would be too large; it is unchanged.
         """
         with self._holding:
             if count > 0 and self._held + count > _MAX_HELD:
@@ -121,7 +120,7 @@ class Ros1Server:
         for stream in list(self._streams):
             stream.close()
 
-    def _follow(self, events: int) -> None:
+    def _watch_socket(self, events: int) -> None:
         if self._socket.fileno() >= 0:
             self.loop.watch(self._socket, events, self._accept)
 
@@ -134,15 +133,15 @@ class Ros1Server:
             except OSError as error:
                 if self._socket.fileno() >= 0 and error.errno in {errno.EMFILE, errno.ENFILE}:
                     log.warning("cannot take a connection: %s; trying again", error.strerror)
-                    self._follow(0)
-                    self.loop.later(_PAUSE, lambda: self._follow(selectors.EVENT_READ))
+                    self._watch_socket(0)
+                    self.loop.later(_PAUSE, lambda: self._watch_socket(selectors.EVENT_READ))
                 return
             incoming = Incoming(self, sock)
             self._streams.add(incoming.stream)
 
 
 class Incoming(Handler):
-    """A connection that another program has made: calls, or one header."""
+    """A connection from another program, which sends either calls or one header."""
 
     def __init__(self, server: Ros1Server, sock: socket.socket) -> None:
         self.server = server
@@ -150,12 +149,12 @@ class Incoming(Handler):
         self._first = b""
         self._calls: CallReader | None = None
         self._frames: FrameReader | None = None
-        self._greeted = False
+        self._has_header = False
         self.stream = Stream(server.loop, sock, self, self._ended)
         self._check_later()
 
     def space(self) -> memoryview:
-        """Return where the next bytes belong."""
+        """Return the buffer for the next bytes."""
         return memoryview(self.server.piece)
 
     def received(self, count: int) -> None:
@@ -177,7 +176,7 @@ class Incoming(Handler):
             self._feed_header(self._frames, data)
 
     def hold(self, count: int) -> None:
-        """Note how many bytes of a request that is not complete the connection holds.
+        """Set the number of bytes of an incomplete request that the connection holds.
 
         Raises:
             TransportError: All connections together hold too many.
@@ -192,7 +191,7 @@ class Incoming(Handler):
         self.hold(0)
 
     def refuse(self, text: str) -> None:
-        """Close the stream after an error in words, which is logged once; any thread may."""
+        """Log an error once, and close the stream; any thread may call this."""
         self.server.report(f"refused a connection of {self.stream.host}: {text}")
         self.stream.end()
 
@@ -223,13 +222,13 @@ class Incoming(Handler):
             self.stream.end()
 
     def _feed_header(self, reader: FrameReader, data: memoryview) -> None:
-        while data and not self._greeted:
+        while data and not self._has_header:
             space = reader.space()
             count = min(len(space), len(data))
             space[:count] = data[:count]
             data = data[count:]
             for frame in reader.take(count):
-                self._greeted = True
+                self._has_header = True
                 header = decode_header(frame)
                 # The other end sends nothing until it is answered.
                 self.stream.pause(reading=False)
@@ -239,7 +238,7 @@ class Incoming(Handler):
             self.hold(reader.pending)
 
     def _check_later(self) -> None:
-        """Look at the progress in a while; the timer does not keep what has ended."""
+        """Check the progress after a while; the timer does not keep an ended connection alive."""
         check = WeakMethod(self._check_progress)
 
         def run() -> None:
@@ -250,8 +249,8 @@ class Incoming(Handler):
         self.server.loop.later(_TIMEOUT, run)
 
     def _check_progress(self) -> None:
-        """Close a connection that has begun something and does not come to its end."""
-        if self.stream.is_closed or self._greeted:
+        """Close a connection whose call or header is still incomplete."""
+        if self.stream.is_closed or self._has_header:
             return
         if self._calls is not None and self._calls.is_idle:
             self._check_later()

@@ -4,14 +4,7 @@
 ``rosz[websocket]``.
 """
 
-from __future__ import annotations
-
 from rosz.bridges.rosbridge.plain import Spelling
 from rosz.bridges.rosbridge.rosapi import RosApi
-from rosz.bridges.rosbridge.server import (
-    PORT,
-    RosbridgeLimits,
-    RosbridgeSettings,
-    WebsocketBridge,
-    open_bridge,
-)
+from rosz.bridges.rosbridge.server import PORT, RosbridgeSettings, WebsocketBridge, open_bridge
+from rosz.bridges.rosbridge.state import RosbridgeLimits

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rosz.actions import GoalState
+from rosz.actions import ActionClient, ActionServer, ClientGoal, GoalState, ServerGoal
 from rosz.bridges.clients import build
 from rosz.bridges.rosbridge import operations as ops
 from rosz.bridges.rosbridge.plain import Spelling, converter
+from rosz.bridges.rosbridge.state import ClientState
 from rosz.errors import ActionError, RoszError, UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rosz.actions import ActionClient, ActionServer, ClientGoal, ServerGoal
-    from rosz.bridges.rosbridge.state import ClientState
 
 
 class SentGoals:

@@ -52,7 +52,7 @@ class RosbridgeClient:
         self._node = shared.node
         self._password = shared.policy.password
         self._state = state = ClientState(shared, queue, name)
-        self._fragments = ops.Fragments(shared.limit)
+        self._fragments = ops.Fragments(shared.limits.operation)
         topics = TopicOperations(state)
         services, calls = ServedServices(state), ServiceCalls(state)
         actions, goals = ServedActions(state), SentGoals(state)

@@ -32,7 +32,7 @@ def build_from_json(cls: type[Any], text: msgspec.Raw, spelling: Spelling, now: 
     Args:
         cls: Class of the message.
         text: The text.
-        spelling: Spelling of field names that is decoded without a conversion field by field.
+        spelling: Spelling of field names that msgspec decodes, without a step for each field.
         now: Time in nanoseconds.
 
     Raises:
@@ -80,10 +80,10 @@ class _JsonCompiler:
         Args:
             default: Message with the values of the fields that the JSON omits.
             owner: Expression for the instance of the class.
-            timed: Path of the field that becomes the time if the JSON omits it; empty for none.
+            timed: Path of the field that is set to the time if the JSON omits it; empty for none.
         """
         cls = type(default)
-        own = {slot.name: slot for slot in slots(cls)}  # with the ranges that messages have
+        own = {slot.name: slot for slot in slots(cls)}  # as messages have them, with other ranges
         fields: list[Any] = []
         shown, arguments = {}, []
         for name, given in shown_fields(cls, self._spelling):

@@ -101,9 +101,9 @@ class _Answers:
     # Topics.
 
     def _typed_topics(self) -> dict[str, str]:
-        types_by_name = self._view().topics()
+        types_by_name, in_ros1 = self._view().topics(), self._spelling == "ros1"
         return {
-            name: _spelt_topic(name, types[0], self._spelling)
+            name: ros1_type(name, types[0]) if in_ros1 else _spelt(types[0], self._spelling)
             for name, types in sorted(types_by_name.items())
             if self._policy.shows("topics", name) and "/_action/" not in name
         }
@@ -288,10 +288,6 @@ def _spelt(type_name: str, spelling: Spelling) -> str:
         return short_type(type_name) if spelling == "ros1" else type_name
     package, _, name = type_name.partition("/")
     return f"{package}/msg/{name}"
-
-
-def _spelt_topic(topic: str, type_name: str, spelling: Spelling) -> str:
-    return ros1_type(topic, type_name) if spelling == "ros1" else _spelt(type_name, spelling)
 
 
 def _nodes_of(tokens: Iterable[Any]) -> list[str]:

@@ -8,24 +8,13 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from rosz.access import ServerAccess
-from rosz.bridges.clients import (
-    BridgeSettings,
-    ClientLimits,
-    ClientTopics,
-    OutgoingQueue,
-    TopicQueue,
-    WebsocketServer,
-    host_of,
-    pieces,
-    place,
-    task_worker,
-)
+from rosz.bridges import clients
 from rosz.bridges.rosbridge.client import RosbridgeClient
 from rosz.bridges.rosbridge.encoded import EncodedMessage, Encodings, SubscribedQueue
 from rosz.bridges.rosbridge.operations import fragments, png
 from rosz.bridges.rosbridge.plain import Spelling
 from rosz.bridges.rosbridge.rosapi import RosApi
-from rosz.bridges.rosbridge.state import Gateways, RosbridgeResources
+from rosz.bridges.rosbridge.state import Gateways, RosbridgeLimits, RosbridgeResources
 from rosz.errors import RoszError
 from rosz.lifecycle import Lifecycle
 from rosz.transforms import Republisher
@@ -48,25 +37,7 @@ _ENCODED_HERE = 16384
 _LATE = "the password is missing"  # text for the client
 
 
-class RosbridgeLimits(ClientLimits, frozen=True, kw_only=True):
-    """Limits on the number of clients and on their messages.
-
-    Attributes:
-        encoded: Largest size of encoded messages that are kept for several clients, in bytes.
-        operation: Largest size of an operation that a client sends, in bytes.
-        password: Largest size of an operation before the client is authenticated, in bytes.
-        password_seconds: Time in which a client must authenticate, in seconds.
-        fragment_size: Largest number of characters that are sent in one piece; None for no limit.
-    """
-
-    encoded: int = 64 << 20
-    operation: int = 64 << 20
-    password: int = 4096
-    password_seconds: float = 10.0
-    fragment_size: int | None = None
-
-
-class RosbridgeSettings(BridgeSettings, frozen=True, kw_only=True):
+class RosbridgeSettings(clients.BridgeSettings, frozen=True, kw_only=True):
     """Settings of a bridge.
 
     Attributes:
@@ -79,7 +50,7 @@ class RosbridgeSettings(BridgeSettings, frozen=True, kw_only=True):
     fragment_size: int | None = None
 
 
-class WebsocketBridge(WebsocketServer[RosbridgeClient, EncodedMessage]):
+class WebsocketBridge(clients.WebsocketServer[RosbridgeClient, EncodedMessage]):
     """A server of the rosbridge protocol, whose clients take part in the network of a node.
 
     Args:
@@ -108,13 +79,11 @@ class WebsocketBridge(WebsocketServer[RosbridgeClient, EncodedMessage]):
         self._shared = RosbridgeResources(
             node,
             access.policy,
-            ClientTopics(node, partial(EncodedMessage, Encodings(limits.encoded))),
+            clients.ClientTopics(node, partial(EncodedMessage, Encodings(limits.encoded))),
             Gateways(node),
             RosApi(node),
-            lifecycle.keep(task_worker("rosz-calls")),
+            lifecycle.keep(clients.task_worker("rosz-calls")),
             spelling,
-            limits.operation,
-            limits.fragment_size,
             limits,
         )
         self._republishing = threading.Lock()
@@ -132,11 +101,14 @@ class WebsocketBridge(WebsocketServer[RosbridgeClient, EncodedMessage]):
     def _client(
         self,
         websocket: ServerConnection,
-        queue: OutgoingQueue[EncodedMessage],
+        queue: clients.OutgoingQueue[EncodedMessage],
         refuse: Callable[[str], None],
     ) -> RosbridgeClient:
         trusted = self._policy.is_authenticated(websocket.request)
-        name, pause = place(websocket), partial(self._guesses.pause, host_of(websocket))
+        name, pause = (
+            clients.place(websocket),
+            partial(self._guesses.pause, clients.host_of(websocket)),
+        )
         return RosbridgeClient(self._shared, queue, name, refuse, pause, trusted=trusted)
 
     async def _receive(self, websocket: ServerConnection, client: RosbridgeClient) -> None:
@@ -165,19 +137,19 @@ class WebsocketBridge(WebsocketServer[RosbridgeClient, EncodedMessage]):
     async def _write_answer(
         self, websocket: ServerConnection, _client: RosbridgeClient, answer: bytes
     ) -> None:
-        await websocket.send(pieces(answer), text=True)
+        await websocket.send(clients.pieces(answer), text=True)
 
     async def _write_message(
         self,
         websocket: ServerConnection,
         client: RosbridgeClient,
         message: EncodedMessage,
-        topic: TopicQueue[EncodedMessage],
+        topic: clients.TopicQueue[EncodedMessage],
     ) -> None:
         assert isinstance(topic, SubscribedQueue)  # noqa: S101  # clients subscribe with no other class
         number = next(client.message_numbers)
         for frame in await self._encode(message, topic, number):
-            await websocket.send(pieces(frame), text=not topic.form[0].startswith("cbor"))
+            await websocket.send(clients.pieces(frame), text=not topic.form[0].startswith("cbor"))
 
     async def _encode(
         self, message: EncodedMessage, topic: SubscribedQueue, number: int

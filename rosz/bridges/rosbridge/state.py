@@ -27,6 +27,24 @@ _CALL_SIZE = 1000
 """Bytes that a call takes beside its operation."""
 
 
+class RosbridgeLimits(ClientLimits, frozen=True, kw_only=True):
+    """Limits on the number of clients and on their messages.
+
+    Attributes:
+        encoded: Largest size of encoded messages that are kept for several clients, in bytes.
+        operation: Largest size of an operation that a client sends, in bytes.
+        password: Largest size of an operation before the client is authenticated, in bytes.
+        password_seconds: Time in which a client must authenticate, in seconds.
+        fragment_size: Largest number of characters that are sent in one piece; None for no limit.
+    """
+
+    encoded: int = 64 << 20
+    operation: int = 64 << 20
+    password: int = 4096
+    password_seconds: float = 10.0
+    fragment_size: int | None = None
+
+
 class Gateways:
     """Servers of ROS 2 that clients reach by actionlib's topics."""
 
@@ -74,8 +92,6 @@ class RosbridgeResources(msgspec.Struct, frozen=True):
     Attributes:
         worker: Threads for calls and goals, which take long.
         spelling: Whose names of types and fields a client gets that has not shown its own.
-        limit: Largest size of an operation in parts, and of the calls that have not ended.
-        fragment_size: Largest number of characters of an answer that does not go in parts.
         limits: The limits on a client.
     """
 
@@ -86,9 +102,7 @@ class RosbridgeResources(msgspec.Struct, frozen=True):
     rosapi: RosApi
     worker: Worker[Task]
     spelling: Spelling
-    limit: int
-    fragment_size: int | None
-    limits: ClientLimits
+    limits: RosbridgeLimits
 
 
 class ClientState:
@@ -107,13 +121,13 @@ class ClientState:
         self.spelling: Spelling = shared.spelling
         self.size: int = 0
         self._name = name
-        self._tasks = ClientTasks(shared.worker, shared.limit, shared.limits)
+        self._tasks = ClientTasks(shared.worker, shared.limits.operation, shared.limits)
         self._level: Level = "error"
         self._numbers = itertools.count(1)
 
     def send(self, value: dict[str, Any], *, fragment_size: float | None = None) -> None:
         """Send an operation."""
-        text, size = msgspec.json.encode(value), fragment_size or self.shared.fragment_size
+        text, size = msgspec.json.encode(value), fragment_size or self.shared.limits.fragment_size
         for part in fragments(text, size, next(self._numbers)):
             self.queue.put(part)
 

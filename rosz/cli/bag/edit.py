@@ -177,10 +177,7 @@ def _write(call: Call, bags: Sequence[str], output: str, form: _Form) -> int:
     from rosz.bags.edit import Transfer
 
     _check_output(output, bags)
-    with (
-        open_bags(bags) as source,
-        form.create(output) as writer,
-    ):
+    with open_bags(bags) as source, form.create(output) as writer:
         for reader in source.readers:
             for name, texts in reader.metadata.items():
                 writer.add_metadata(name, texts)

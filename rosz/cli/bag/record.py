@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from msgspec import Struct
@@ -278,7 +277,9 @@ def _keep_last(recording: _Recording, duration: int) -> None:
             ring.end = stack.enter_context(parameters).begin
         recorder = stack.enter_context(recording.recorder(ring, ended))
         stack.enter_context(node.service("~snapshot", Trigger, serve))
-        signalled = stack.enter_context(_on_signal())
+        signalled = threading.Event()
+        before = signal.signal(signal.SIGUSR1, lambda *_: signalled.set())
+        stack.callback(signal.signal, signal.SIGUSR1, before)
         report(f"Keeping the last {duration / _SECOND:g} s; SIGUSR1 writes them to a bag.")
 
         def look() -> None:
@@ -293,37 +294,18 @@ def _keep_last(recording: _Recording, duration: int) -> None:
 
 
 @contextmanager
-def _on_signal() -> Iterator[threading.Event]:
-    """Set an event on SIGUSR1."""
-    signalled = threading.Event()
-
-    def handle(_number: int, _frame: FrameType | None) -> None:
-        signalled.set()
-
-    before = signal.signal(signal.SIGUSR1, handle)
-    try:
-        yield signalled
-    finally:
-        signal.signal(signal.SIGUSR1, before)
-
-
-@contextmanager
 def _end_by_signal() -> Iterator[threading.Event]:
     """Set an event on Ctrl-C, SIGTERM or SIGHUP: no exception comes between a bag and its end.
 
     A later signal ends the process at once, and leaves the bag for ``rosz bag reindex``.
     """
     ended = threading.Event()
-    before = {number: signal.getsignal(number) for number in _ENDS}
     handle = at_first_signal(ended.set)
-    for number, handler in before.items():
-        if handler is not signal.SIG_IGN:
-            signal.signal(number, handle)
-    try:
+    with ExitStack() as stack:
+        for number in _ENDS:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                stack.callback(signal.signal, number, signal.signal(number, handle))
         yield ended
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _run(

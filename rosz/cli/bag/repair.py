@@ -32,8 +32,8 @@ def check_command(call: Call, bags: _Bags, *, json: Json = False) -> int:
     for bag in bags:
         differences: list[TypeDifference] = []
         try:
-            read, problems = check_bag(Path(bag))
             with open_reader(bag) as reader:
+                read, problems = check_bag(reader)
                 differences = find_differences(reader.channels, call.types)
         except BagError as error:
             read, problems = 0, [error]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -74,15 +75,9 @@ def cat_command(
     )
     with open_bags([bag]) as source:
         echoes = _Echoes(source.readers[0], topic, options, call)
-        for entry in source.entries(Part(topics=echoes.topics, start=start, end=end)):
-            text = echoes.text(entry)
-            if text is None:
-                continue
+        entries = source.entries(Part(topics=echoes.topics, start=start, end=end))
+        for text in islice(filter(None, map(echoes.text, entries)), limit):
             sys.stdout.write(text)
-            if limit is not None:
-                limit -= 1
-                if not limit:
-                    break
     return int(bool(source.problems.count))
 
 
@@ -120,24 +115,30 @@ def export_command(
     if fps is not None and not 0 < fps <= _FASTEST:
         raise UsageError(f"--fps is {fps:g}; expected more than 0, and at most {_FASTEST:g}")
     with open_bags([bag]) as source:
-        chosen = _ExportChoice(source, part)
-        chosen.entries()  # a topic that is not there is an error before any file is made
+        export = _Export(source, part, Path(folder), call.types, replace=force)
+        export.entries()  # a topic that is not there is an error before any file is made
         if form in {"csv", "json", "parquet"}:
-            lines = _export_tables(chosen, Path(folder), form, call.types, replace=force)
+            print_lines(_export_tables(export, form))
         elif form == "mp4":
-            lines = _export_videos(chosen, Path(folder), fps, call.types, replace=force)
+            print_lines(_export_videos(export, fps))
         else:
-            lines = _export_pictures(chosen, Path(folder), form, call.types, replace=force)
-        print_lines(lines)
+            print_lines(_export_pictures(export, form))
     return int(bool(source.problems.count))
 
 
-class _ExportChoice:
-    """The messages of a bag that options choose."""
+class _Export:
+    """The messages of a bag that options choose, and the folder for their files."""
 
-    def __init__(self, source: BagInput, part: Part) -> None:
+    def __init__(
+        self, source: BagInput, part: Part, folder: Path, types: TypeStore, *, replace: bool
+    ) -> None:
+        from rosz.bags import Bag
+
         self.reader = source.readers[0]
-        self.report = source.problems.report
+        self.types = types
+        self.folder = folder
+        self.replace = replace
+        self.decoder = Bag(self.reader, types).decoder
         self._source = source
         self._part = part
 
@@ -145,8 +146,8 @@ class _ExportChoice:
         """Return the messages, from the first one on."""
         return self._source.entries(self._part)
 
-    def choose_images(self) -> dict[str, str]:
-        """Choose the topics with images if none are given; return the names of their files."""
+    def choose_images(self) -> dict[str, Path]:
+        """Choose the topics with images if none are given; return the paths of their files."""
         from rosz.bags.export import IMAGE_TYPES, file_names
 
         types = {channel.topic: channel.type for channel in self.reader.channels}
@@ -159,7 +160,8 @@ class _ExportChoice:
         if not names:
             raise NotFoundError("the bag has no topic with images: no Image, no CompressedImage")
         self._part = replace(self._part, topics=names)
-        return {topic: name for topic, name in file_names(images).items() if topic in names}
+        files = file_names(images)
+        return {topic: self.folder / files[topic] for topic in images if topic in names}
 
     @contextmanager
     def left_out_if_damaged(self, entry: Entry) -> Iterator[None]:
@@ -168,74 +170,63 @@ class _ExportChoice:
             yield
         except MessageError as error:
             place = f"message of '{entry.channel.topic}' at {entry.stamp / 1e9:.9f}"
-            self.report(f"{place} is left out: {error}")
+            self._source.problems.report(f"{place} is left out: {error}")
 
 
-def _export_tables(
-    chosen: _ExportChoice, folder: Path, form: str, types: TypeStore, *, replace: bool
-) -> list[str]:
+def _export_tables(export: _Export, form: str) -> list[str]:
     from rosz.bags.export import Tables
 
-    with Tables(folder, form, chosen.reader.channels, types, replace=replace) as tables:
-        for entry in chosen.entries():
-            with chosen.left_out_if_damaged(entry):
+    channels = export.reader.channels
+    with Tables(export.folder, form, channels, export.types, replace=export.replace) as tables:
+        for entry in export.entries():
+            with export.left_out_if_damaged(entry):
                 tables.write(entry)
     return [f"{file}: {count(rows, 'row')}" for file, rows in sorted(tables.rows.items())]
 
 
-def _export_pictures(
-    chosen: _ExportChoice, folder: Path, form: str, types: TypeStore, *, replace: bool
-) -> list[str]:
+def _export_pictures(export: _Export, form: str) -> list[str]:
     _check_vision()
-    from rosz.bags import Bag
     from rosz.bags.export import ImageFiles
 
-    names = chosen.choose_images()
-    decoder = Bag(chosen.reader, types).decoder
+    folders = export.choose_images()
     files: dict[str, ImageFiles] = {}
-    for entry in chosen.entries():
+    for entry in export.entries():
         topic = entry.channel.topic
         if topic not in files:
-            files[topic] = ImageFiles(folder / names[topic], form, replace=replace)
-        with chosen.left_out_if_damaged(entry):
-            files[topic].write(decoder(entry.channel)(entry.data), entry.stamp)
+            files[topic] = ImageFiles(folders[topic], form, replace=export.replace)
+        with export.left_out_if_damaged(entry):
+            files[topic].write(export.decoder(entry.channel)(entry.data), entry.stamp)
     return [
-        f"{folder / names[topic]}: {count(pictures.count, 'picture')}"
+        f"{folders[topic]}: {count(pictures.count, 'picture')}"
         for topic, pictures in sorted(files.items())
     ]
 
 
-def _export_videos(
-    chosen: _ExportChoice, folder: Path, rate: float | None, types: TypeStore, *, replace: bool
-) -> list[str]:
+def _export_videos(export: _Export, rate: float | None) -> list[str]:
     _check_vision()
-    from rosz.bags import Bag
     from rosz.bags.export import Video, VideoTimes
 
-    names = chosen.choose_images()
-    decoder = Bag(chosen.reader, types).decoder
+    files = {
+        topic: path.with_name(f"{path.name}.mp4") for topic, path in export.choose_images().items()
+    }
     times: dict[str, VideoTimes] = {}
-    for entry in chosen.entries():
-        with chosen.left_out_if_damaged(entry):
-            message = decoder(entry.channel)(entry.data)
+    for entry in export.entries():
+        with export.left_out_if_damaged(entry):
+            message = export.decoder(entry.channel)(entry.data)
             times.setdefault(entry.channel.topic, VideoTimes()).add(message, entry.stamp)
-    lines = []
     videos: dict[str, Video] = {}
-    try:
+    with ExitStack() as stack:
         for topic, frames in times.items():
-            videos[topic] = Video(folder / f"{names[topic]}.mp4", frames, rate, replace=replace)
-        for entry in chosen.entries():
-            with chosen.left_out_if_damaged(entry):
-                videos[entry.channel.topic].write(decoder(entry.channel)(entry.data))
-    finally:
-        for video in videos.values():
-            video.close()
-    for topic, video in sorted(videos.items()):
-        lines.append(
-            f"{folder / names[topic]}.mp4: {count(video.count, 'frame')} at {video.rate:g} per"
-            f" second, {video.repeated} repeated, {video.dropped} left out"
-        )
-    return lines
+            video = Video(files[topic], frames, rate, replace=export.replace)
+            videos[topic] = stack.enter_context(closing(video))
+        for entry in export.entries():
+            with export.left_out_if_damaged(entry):
+                videos[entry.channel.topic].write(export.decoder(entry.channel)(entry.data))
+    return [
+        f"{files[topic]}: {count(video.count, 'frame')} at {video.rate:g} per"
+        f" second, {video.repeated} repeated, {video.dropped} left out"
+        for topic, video in sorted(videos.items())
+    ]
 
 
 def _check_vision() -> None:

@@ -1,8 +1,8 @@
 """The network as ROS 2's commands see it, and the node with which they take part.
 
 Every node of ROS 2 serves its parameters and publishes ``/rosout`` and ``/parameter_events``. A
-node of rosz begins to do so when it is asked, so it is shown with them. The node of the command
-itself is there, too: it is hidden, and counts as a publisher.
+node of rosz does so only when somebody asks for them, but is always shown with them. The node of
+the command itself is hidden in lists, and counts as a publisher.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ def is_hidden(name: str) -> bool:
 
 
 def visible_nodes(view: View, *, hidden: bool) -> list[str]:
-    """Return the full names of nodes, sorted; hidden ones if wanted."""
+    """Return the sorted full names of nodes, with or without hidden ones."""
     return [name for name in view.nodes() if hidden or not is_hidden(name)]
 
 
 def read_view() -> View:
-    """Return all nodes; only the own one, with a warning, where nobody answers."""
+    """Return the graph; if no process answers, print a warning: it then has only the own node."""
     call = Call()
     tokens: tuple[Token, ...] = ()
     try:
@@ -67,11 +67,11 @@ def read_view() -> View:
     except TransportError as error:
         print_error(f"WARNING: {error}")
     own = Token(call.domain, "0", 0, 0, Kind.NODE, "/", NODE_NAME)
-    return View([*tokens, *_standard(own, topics_only=True), own, *_completed(tokens)])
+    return View([*tokens, *_standard(own, topics_only=True), own, *_missing_standard(tokens)])
 
 
-def _completed(tokens: Iterable[Token]) -> Iterator[Token]:
-    """Yield the tokens that the nodes of rosz will have when somebody asks for them."""
+def _missing_standard(tokens: Iterable[Token]) -> Iterator[Token]:
+    """Yield the tokens that nodes of rosz lack, but will have when somebody asks for them."""
     nodes = {(t.zid, t.node_id): t for t in tokens if is_rosz_id(t.zid)}
     present = {(token.zid, token.node_id, token.kind, token.name) for token in tokens}
     for node in nodes.values():
@@ -81,7 +81,7 @@ def _completed(tokens: Iterable[Token]) -> Iterator[Token]:
 
 
 def _standard(node: Token, *, topics_only: bool = False) -> Iterator[Token]:
-    """Yield the tokens of what every node of ROS 2 has."""
+    """Yield the tokens of the topics and services that every node of ROS 2 has."""
 
     def make(kind: Kind, name: str, type_name: str, qos: QoS) -> Token:
         place = (node.domain, node.zid, node.node_id, 0, kind, node.namespace, node.node)
@@ -116,7 +116,7 @@ def open_node(name: str | None = None, *, lasting: bool = False) -> Iterator[Nod
 
 
 def _context(*, lasting: bool) -> Context:
-    """Join the others, or wait for them where there are none, as any node does."""
+    """Return a context; without other processes, one that waits for them, as that of any node."""
     from rosz.introspect import open_context
     from rosz.node import Context
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
+from rosz.cli.console import print_error
 from rosz.cli.ros2.table import GROUPS, Verb, flags, verbs
 from rosz.errors import RoszError
 
@@ -33,7 +34,7 @@ def main(words: Sequence[str]) -> int:
         return _INTERRUPTED
     if isinstance(result, str):
         sys.stdout.flush()
-        sys.stderr.write(f"{result}\n")
+        print_error(result)
         return 1
     return result or 0
 

@@ -197,6 +197,8 @@ def manifest(given: Namespace) -> str | None:
 
 def create(given: Namespace) -> str | None:
     """Create a package."""
+    import getpass
+
     from rosz.workspace import LICENSES, AmentPackage
 
     if given.license == "?":
@@ -209,7 +211,7 @@ def create(given: Namespace) -> str | None:
         dependencies=tuple(given.dependencies),
         description=given.description or "TODO: Package description",
         license=given.license or "TODO: License declaration",
-        maintainer=given.maintainer_name or _user(),
+        maintainer=given.maintainer_name or getpass.getuser(),
         email=given.maintainer_email or "",
         manifest_format=int(given.package_format),
         node=given.node_name or "",
@@ -231,9 +233,3 @@ def create(given: Namespace) -> str | None:
             ]
         )
     return None
-
-
-def _user() -> str:
-    import getpass
-
-    return getpass.getuser()

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 from argparse import Namespace
-from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,76 +15,50 @@ from rosz.errors import ParamError, RoszError, WaitTimeout
 
 if TYPE_CHECKING:
     from rosz.node import Node
+    from rosz.node.ros2 import RemoteParameters
 
 _SERVICE_SECONDS = 5.0
-_TYPES: tuple[tuple[str, str, str], ...] = (
-    ("not set", "Parameter not set.", ""),
-    ("boolean", "Boolean value is:", "bool_value"),
-    ("integer", "Integer value is:", "integer_value"),
-    ("double", "Double value is:", "double_value"),
-    ("string", "String value is:", "string_value"),
-    ("byte array", "Byte values are:", "byte_array_value"),
-    ("boolean array", "Boolean values are:", "bool_array_value"),
-    ("integer array", "Integer values are:", "integer_array_value"),
-    ("double array", "Double values are:", "double_array_value"),
-    ("string array", "String values are:", "string_array_value"),
+_CALL_SECONDS = 60.0
+_EMPTY_LIST = 6
+_TYPES = (
+    ("not set", "Parameter not set."),
+    ("boolean", "Boolean value is:"),
+    ("integer", "Integer value is:"),
+    ("double", "Double value is:"),
+    ("string", "String value is:"),
+    ("byte array", "Byte values are:"),
+    ("boolean array", "Boolean values are:"),
+    ("integer array", "Integer values are:"),
+    ("double array", "Double values are:"),
+    ("string array", "String values are:"),
 )
-"""By number: the name of a type, what ``get`` prints before a value, and the field of the value."""
-_LISTS = {bool: 6, int: 7, float: 8, str: 9}
-_SCALARS = {bool: 1, int: 2, float: 3}
-
-
-class _Parameters:
-    """The parameters of one node of the network."""
-
-    def __init__(self, node: Node, name: str) -> None:
-        self._node = node
-        self.name = name
-
-    def _call(self, service: str, *values: Any) -> Any:
-        from rosz.msgs.rcl_interfaces import srv
-
-        kind = getattr(srv, "".join(map(str.title, service.split("_"))))
-        with self._node.client(f"{self.name}/{service}", kind) as client:
-            try:
-                client.wait_for_service(_SERVICE_SECONDS)
-            except WaitTimeout as error:
-                raise CommandFailed(
-                    "Wait for service timed out waiting for parameter services for node"
-                    f" {self.name}"
-                ) from error
-            try:
-                return client(*values)
-            except RoszError as error:
-                raise CommandFailed(
-                    f"Exception while calling service of node {self.name}: {error}"
-                ) from error
-
-    def names(self, prefixes: Sequence[str] = ()) -> list[str]:
-        """Return the names of the parameters, sorted."""
-        return sorted(self._call("list_parameters", list(prefixes), 0).result.names)
-
-    def values(self, names: Sequence[str]) -> list[Any]:
-        """Return values; none if the node does not know a name."""
-        values: list[Any] = self._call("get_parameters", list(names)).values
-        return values
-
-    def descriptors(self, names: Sequence[str]) -> list[Any]:
-        """Return the descriptors of parameters."""
-        descriptors: list[Any] = self._call("describe_parameters", list(names)).descriptors
-        return descriptors
-
-    def set(self, values: dict[str, Any]) -> list[Any]:
-        """Set parameters one by one, and return the results."""
-        from rosz.msgs.rcl_interfaces.msg import Parameter
-
-        parameters = [Parameter(name, value) for name, value in values.items()]
-        results: list[Any] = self._call("set_parameters", parameters).results
-        return results
+"""By number: the name of a type, and what ``get`` prints before a value."""
 
 
 @contextmanager
-def _of_node(given: Namespace) -> Iterator[_Parameters]:
+def _services_of(node: Node, name: str) -> Iterator[RemoteParameters]:
+    """Wait for the services of a node, which nodes of rosz have when a client of one appears."""
+    from rosz.node.ros2 import SERVICES, RemoteParameters
+
+    with node.client(f"{name}/list_parameters", SERVICES["list_parameters"]) as client:
+        try:
+            client.wait_for_service(_SERVICE_SECONDS)
+        except WaitTimeout as error:
+            raise CommandFailed(
+                f"Wait for service timed out waiting for parameter services for node {name}"
+            ) from error
+        server = client.others.view().servers(client.name)[0]
+    try:
+        yield RemoteParameters(node.context.session, server, _CALL_SECONDS)
+    except CommandFailed:
+        raise
+    except RoszError as error:
+        text = f"Exception while calling service of node {name}: {error}"
+        raise CommandFailed(text) from error
+
+
+@contextmanager
+def _of_node(given: Namespace) -> Iterator[RemoteParameters]:
     """Find the node that the command line names."""
     name = f"/{given.node.removeprefix('/')}"
     with open_node() as node:
@@ -97,14 +70,16 @@ def _of_node(given: Namespace) -> Iterator[_Parameters]:
                 graph.wait_for_node(name, given.timeout)
         except WaitTimeout as error:
             raise CommandFailed("Node not found") from error
-        yield _Parameters(node, name)
+        with _services_of(node, name) as parameters:
+            yield parameters
 
 
 def _python(value: Any) -> Any:
     """Return a value as Python has it; None if it is not set."""
-    field = _TYPES[value.type][2]
-    raw: Any = getattr(value, field) if field else None
-    return list(raw) if isinstance(raw, bytes | array) else raw
+    from rosz.node.ros2 import from_ros2
+
+    raw = from_ros2(value) if value.type else None
+    return list(raw) if isinstance(raw, bytes) else raw
 
 
 def _read_value(text: str) -> Any:
@@ -122,12 +97,20 @@ def _read_value(text: str) -> Any:
 
 def _to_value(value: Any) -> Any:
     """Return a value as ROS 2 sends it; None if it has no type for it."""
-    from rosz.msgs.rcl_interfaces.msg import ParameterValue
+    from rosz.node.ros2 import to_type, type_of
 
-    number = _SCALARS.get(type(value), 4 if isinstance(value, str) else 0)
-    if isinstance(value, list):
-        number = next((n for kind, n in _LISTS.items() if {*map(type, value)} <= {kind}), 0)
-    return ParameterValue(number, **{_TYPES[number][2]: value}) if number else None
+    is_mixed = isinstance(value, list) and len({*map(type, value)}) > 1
+    return to_type(value, _EMPTY_LIST, "") if type_of(value) and not is_mixed else None
+
+
+def _describe(parameters: RemoteParameters, names: list[str]) -> list[Any]:
+    descriptors: list[Any] = parameters.begin("describe_parameters", names)().descriptors
+    return descriptors
+
+
+def _put(parameters: RemoteParameters, values: list[Any]) -> list[Any]:
+    results: list[Any] = parameters.begin("set_parameters", values)().results
+    return results
 
 
 def list_parameters(given: Namespace) -> str | None:
@@ -136,26 +119,27 @@ def list_parameters(given: Namespace) -> str | None:
     with open_node() as node:
         names = sorted({*visible_nodes(node.context.graph.refresh(), hidden=given.hidden)})
         if given.node:
-            wanted = f"/{given.node.removeprefix('/')}"
-            names = [name for name in names if name == wanted]
+            names = [name for name in names if name == f"/{given.node.removeprefix('/')}"]
             if not names:
                 return "Node not found"
         for name in names:
-            _list_of(_Parameters(node, name), given, pattern)
+            try:
+                with _services_of(node, name) as parameters:
+                    _list_of(parameters, given, pattern)
+            except CommandFailed as error:
+                print_error(str(error))
     return None
 
 
-def _list_of(parameters: _Parameters, given: Namespace, pattern: re.Pattern[str] | None) -> None:
-    try:
-        names = parameters.names(given.param_prefixes)
-    except CommandFailed as error:
-        print_error(str(error))
-        return
+def _list_of(
+    parameters: RemoteParameters, given: Namespace, pattern: re.Pattern[str] | None
+) -> None:
+    names = parameters.names(given.param_prefixes)
     shown = [name for name in names if pattern is None or pattern.match(name)]
     if shown and not given.node:
-        print_lines([f"{parameters.name}:"])
+        print_lines([f"{parameters.node}:"])
     if given.param_type:
-        kinds = {each.name: each.type for each in parameters.descriptors(shown)}
+        kinds = {each.name: each.type for each in _describe(parameters, shown)}
         print_lines(f"  {name} (type: {_TYPES[kinds.get(name, 0)][0]})" for name in shown)
     else:
         print_lines(f"  {name}" for name in shown)
@@ -178,17 +162,19 @@ def get(given: Namespace) -> str | None:
 
 def set_parameter(given: Namespace) -> None:
     """Set a parameter."""
+    from rosz.msgs.rcl_interfaces.msg import Parameter
+
     with _of_node(given) as parameters:
-        (result,) = parameters.set({given.parameter: _read_value(given.value)})
+        (result,) = _put(parameters, [Parameter(given.parameter, _read_value(given.value))])
     _print_result(result, "Set parameter successful", "Setting parameter failed")
 
 
 def delete(given: Namespace) -> None:
     """Delete a parameter."""
-    from rosz.msgs.rcl_interfaces.msg import ParameterValue
+    from rosz.msgs.rcl_interfaces.msg import Parameter
 
     with _of_node(given) as parameters:
-        (result,) = parameters.set({given.parameter: ParameterValue()})
+        (result,) = _put(parameters, [Parameter(given.parameter)])
     _print_result(result, "Deleted parameter successfully", "Deleting parameter failed")
 
 
@@ -205,7 +191,7 @@ def _print_result(result: Any, success: str, failure: str) -> None:
 def describe(given: Namespace) -> None:
     """Describe parameters."""
     with _of_node(given) as parameters:
-        descriptors = parameters.descriptors(given.parameter_names)
+        descriptors = _describe(parameters, given.parameter_names)
     for each in descriptors:
         lines = [f"Parameter name: {each.name}", f"  Type: {_TYPES[each.type][0]}"]
         if each.description:
@@ -213,7 +199,8 @@ def describe(given: Namespace) -> None:
         lines.append("  Constraints:")
         if each.read_only:
             lines.append("    Read only: true")
-        for limits in [*each.floating_point_range, *each.integer_range][:1]:
+        ranges: list[Any] = [*each.floating_point_range, *each.integer_range]
+        for limits in ranges[:1]:
             lines += [f"    Min value: {limits.from_value}", f"    Max value: {limits.to_value}"]
             lines += [f"    Step: {limits.step}"] if limits.step else []
         if each.additional_constraints:
@@ -225,34 +212,29 @@ def dump(given: Namespace) -> None:
     """Print the parameters of a node as a file of parameters."""
     import yaml
 
+    from rosz.params.ros2_file import nest
+
     with _of_node(given) as parameters:
         names = parameters.names()
         values = map(_python, parameters.values(names))
-    tree: dict[str, Any] = {}
-    for name, value in zip(names, values, strict=True):
-        *above, last = name.split(".")
-        inner = tree
-        for part in above:
-            inner = inner.setdefault(part, {})
-        inner[last] = value
-    print_lines([yaml.dump({parameters.name: {"ros__parameters": tree}})])
+    tree = nest(dict(zip(names, values, strict=True)))
+    print_lines([yaml.dump({parameters.node: {"ros__parameters": tree}})])
 
 
 def load(given: Namespace) -> None:
     """Set the parameters that a file has for a node."""
     import yaml
 
+    from rosz.msgs.rcl_interfaces.msg import Parameter
     from rosz.params.ros2_file import sections
 
     with _of_node(given) as parameters:
         values: dict[str, Any] = {}
+        names = {parameters.node} if given.no_use_wildcard else {parameters.node, "/**"}
         try:
             tree = yaml.safe_load(Path(given.parameter_file).read_text("utf-8"))
             for name, own in sections(tree):
-                if f"/{name.strip('/')}" in {
-                    parameters.name,
-                    *(["/**"] * (not given.no_use_wildcard)),
-                }:
+                if f"/{name.strip('/')}" in names:
                     values |= own
         except (ParamError, yaml.YAMLError, UnicodeDecodeError) as error:
             raise CommandFailed(
@@ -264,6 +246,6 @@ def load(given: Namespace) -> None:
         for name, value in converted.items():
             if value is None:
                 raise CommandFailed(f"'{name}' has a value that ROS 2 has no type for")
-        results = parameters.set(converted)
+        results = _put(parameters, [Parameter(*item) for item in converted.items()])
     for name, result in zip(values, results, strict=True):
         _print_result(result, f"Set parameter {name} successful", f"Set parameter {name} failed")

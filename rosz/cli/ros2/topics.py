@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from argparse import Namespace
 from array import array
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from rosz.cli.console import print_lines
+from rosz.cli.console import MessagePrinter, print_lines
 from rosz.cli.ros2.calls import read_values
 from rosz.cli.ros2.graph import CommandFailed, open_node, wait_until
-from rosz.errors import ClosedError, RoszError
+from rosz.errors import RoszError
 from rosz.qos import DEFAULT, PARAMETERS, ROSOUT, SENSOR_DATA, QoS
 from rosz.ros2.rosidl_runtime_py import (
     FILL_ERRORS,
@@ -114,12 +113,9 @@ def echo(given: Namespace) -> None:
         qos = _echo_qos(node, given)
         type_name = given.type or _topic(node, given.name, wait=False).type_name
         cls = _message_class(node.context, type_name, given=given.type is not None)
-        show = _shown(given, fields, condition)
-        with _EchoPrinter(show, once=given.once) as printer:
-            node.subscription(
-                given.name, cls, printer.receive, qos=qos, raw=given.raw, with_info=True
-            )
-            printer.wait(node.context, given.timeout)
+        printer = MessagePrinter(_shown(given, fields, condition), 1 if given.once else None)
+        node.subscription(given.name, cls, printer.receive, qos=qos, raw=given.raw, with_info=True)
+        printer.wait(node.context, timeout=given.timeout)
 
 
 def _condition(given: Namespace) -> Callable[[Any], bool] | None:
@@ -208,49 +204,10 @@ def _text(message: Any, info: MessageInfo, given: Namespace, limits: Limits) -> 
     return f"{before}{to_yaml(message, limits, flow=given.flow_style)}---\n"
 
 
-class _EchoPrinter:
-    """Prints messages on the thread of the subscription; the main thread waits for the end."""
-
-    def __init__(self, show: _Show, *, once: bool) -> None:
-        self._show = show
-        self._once = once
-        self._ended = threading.Event()
-        self._error: Exception | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ended.set()
-
-    def receive(self, message: Any, info: MessageInfo) -> None:
-        if self._ended.is_set():
-            return
-        try:
-            text = self._show(message, info)
-            if text is not None:
-                sys.stdout.write(text)
-                sys.stdout.flush()
-        except Exception as error:  # noqa: BLE001  # raised in the main thread
-            self._error = error
-            self._ended.set()
-        else:
-            if self._once and text is not None:
-                self._ended.set()
-
-    def wait(self, context: Context, timeout: float | None = None) -> None:
-        withdraw = context.on_shutdown(lambda _: self._ended.set())
-        self._ended.wait(timeout)
-        withdraw()
-        if self._error is not None:
-            raise self._error
-        if context.is_shutdown:
-            raise ClosedError(context.reason or "shut down")
-
-
 def echo_service(given: Namespace) -> None:
     """Print the events of a service that is introspected."""
     from rosz.msgs.service_msgs.msg import ServiceEventInfo
+    from rosz.node.ros2 import event_class
 
     names = {
         value: name
@@ -268,7 +225,8 @@ def echo_service(given: Namespace) -> None:
         plain["info"]["event_type"] = names[plain["info"]["event_type"]]
         return f"{to_yaml(plain, flow=given.flow_style)}---\n"
 
-    with open_node(lasting=True) as node, _EchoPrinter(show, once=False) as printer:
+    printer = MessagePrinter(show)
+    with open_node(lasting=True) as node:
         view = node.context.graph.refresh()
         if given.type is None:
             types = view.services().get(node.resolve(given.name))
@@ -283,19 +241,11 @@ def echo_service(given: Namespace) -> None:
                 ]
             )
         try:
-            decoders.append(node.context.decoder(_event_class(node.context, given.type)))
+            decoders.append(node.context.decoder(event_class(node.context.types, given.type)))
         except (RoszError, ValueError) as error:
             raise CommandFailed(f"The service type '{given.type}' is invalid") from error
         node.subscription(topic, None, printer.receive, qos=DEFAULT, raw=True, with_info=True)
         printer.wait(node.context)
-
-
-def _event_class(context: Context, service: str) -> Any:
-    from rosz.bags import Channel, class_of
-
-    text = context.types.definition(service).text
-    channel = Channel("", f"{service}_Event", definition=text, language="ros2msg")
-    return class_of(channel, context.types)
 
 
 # Measuring
@@ -322,7 +272,7 @@ def hz(given: Namespace) -> None:
     condition = _condition(given)
     # Ctrl-C is the regular end of this command, unlike others.
     with suppress(KeyboardInterrupt), open_node(lasting=True) as node:
-        clock = time.monotonic_ns if given.wall_time else node.context.clock.steady
+        clock = time.monotonic_ns if given.wall_time else node.clock.steady
         meters = {name: RateMeter(given.window + 1) for name in given.names}
         for name, meter in meters.items():
             cls = _message_class(node.context, _topic(node, name).type_name, given=False)

@@ -22,6 +22,8 @@ import warnings
 from collections.abc import Callable, ItemsView, Iterable, KeysView, Mapping, ValuesView
 from typing import Any
 
+import msgspec
+
 from rosz.errors import near_miss
 from rosz.launch.plan.document import TextError
 
@@ -161,21 +163,15 @@ class _Refused(Exception):
 _PYTHON_ERRORS = (ArithmeticError, LookupError, RecursionError, TypeError, ValueError)
 
 
-class _Evaluation:
+class _Evaluation(msgspec.Struct, eq=False):
     """The evaluation of one expression."""
 
-    def __init__(
-        self,
-        functions: Mapping[str, Callable[..., Any]],
-        arg: Callable[[str], Any | None],
-        args: Iterable[str],
-    ) -> None:
-        self._functions = functions
-        self._arg = arg
-        self._args = args
-        self._left: float = _MAX_SIZE
-        self._depth = 0
-        self.column = -1  # or that of the innermost part that failed
+    _functions: Mapping[str, Callable[..., Any]]
+    _arg: Callable[[str], Any | None]
+    _args: Iterable[str]
+    _left: float = _MAX_SIZE
+    _depth: int = 0
+    column: int = -1  # or that of the innermost part that failed
 
     def value(self, node: ast.expr) -> Any:
         if self._depth >= _MAX_DEPTH:

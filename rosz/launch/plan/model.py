@@ -170,15 +170,14 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
         respawn_max: Maximum number of respawns, or None for no limit.
         required: Whether the launch ends when the process ends.
         output: ``screen`` or ``log``.
-        cwd: ``node`` (the executable's folder), a path for an ``<executable>``, or
-            ``ROS_HOME``, as empty.
+        cwd: ``node`` (the executable's folder), a path for an ``<executable>``; "" is ``ROS_HOME``.
         remaps: (from, to) in order, as written.
-        env: (name, value) in order, of which the last one counts; without ``ROS_NAMESPACE``.
+        env: (name, value) in order; of equal names the last counts. Without ``ROS_NAMESPACE``.
         wait_for: Waits before the start; all of them must end.
         spawn_delay: Delay before the start in seconds, after `wait_for`.
         container: Full name of the container that runs it, or "" for a process of its own.
-        by_reference: Whether nodes of rospy in that pass on messages themselves, not copies.
-        members: Nodes that the process runs, if it is a container, which has no package then.
+        by_reference: Whether rospy nodes in a container pass on messages, not copies of them.
+        members: Nodes that the process runs if it is a container; a container has no package.
         place: Position of the tag.
     """
 
@@ -331,14 +330,14 @@ class PlanBuilder:
         self._machines: dict[str, MachinePlan] = {}
         self._nodes: dict[str, NodePlan] = {}
         self.tests: list[TestPlan] = []
-        self._used: dict[MachinePlan, str] = {}
+        self._first_used: dict[MachinePlan, str] = {}
 
     def clear(self, ns: str) -> None:
         """Add a parameter namespace to clear."""
         self._clear.setdefault(names.canonical(ns))
 
     def add_param(self, name: str, value: Any, place: Place) -> None:
-        """Add a parameter; it replaces an earlier one of the same name, in that one's position.
+        """Add a parameter; it takes the place of an earlier one of the same name.
 
         Raises:
             TextError: If the name is the root, or the value is not a parameter value.
@@ -423,7 +422,13 @@ class PlanBuilder:
         """
         nodes, tests = list(self._nodes.values()), self.tests
         for node in nodes:
-            self._check_container(node)
+            other = self._nodes.get(node.container)
+            if other is not None:
+                raise _error(
+                    f"container '{node.container}' of node '{node.full_name}' has the name of the"
+                    f" node at {other.place}; give one of them another name",
+                    node.place,
+                )
         if assign_machines:
             nodes = [self._assign_machine(node) for node in nodes]
             tests = [replace(test, node=self._assign_machine(test.node)) for test in tests]
@@ -440,24 +445,15 @@ class PlanBuilder:
             deprecations=tuple(self.deprecations),
         )
 
-    def _check_container(self, node: NodePlan) -> None:
-        other = self._nodes.get(node.container)
-        if other is not None:
-            raise _error(
-                f"container '{node.container}' of node '{node.full_name}' has the name of the node"
-                f" at {other.place}; give one of them another name",
-                node.place,
-            )
-
     def _assign_machine(self, node: NodePlan) -> NodePlan:
-        """Assign a node to the first used machine among those configured alike."""
+        """Assign a node to the first used machine of those with equal settings."""
         if not node.machine:
             return node
         machine = self._machines.get(node.machine)
         if machine is None:
             hint = near_miss(node.machine, self._machines) or "; declare it with <machine>"
             raise _error(f"machine '{node.machine}' is not declared{hint}", node.place)
-        return replace(node, machine=self._used.setdefault(_config(machine), machine.name))
+        return replace(node, machine=self._first_used.setdefault(_config(machine), machine.name))
 
     def _parent_cleared(self, ns: str) -> bool:
         above = (f"{other.rstrip('/')}/" for other in self._clear if other != ns)
@@ -469,5 +465,5 @@ def _error(reason: str, place: Place) -> LaunchFileError:
 
 
 def _config(machine: MachinePlan) -> MachinePlan:
-    """Return the settings by which two machines are the same one."""
+    """Return a machine without what may differ between equal ones."""
     return replace(machine, name="", assignable=True, place=Place(""))

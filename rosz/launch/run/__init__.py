@@ -29,21 +29,7 @@ if TYPE_CHECKING:
     from rosz.launch.run.runner import Options, Runner, describe_plan
     from rosz.launch.run.supervisor import LaunchProcess, Supervisor
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "agent": "serve",
-            "command": "Workplace container_of locate run_command",
-            "control": "LaunchStatus NodeStatus StatusClient",
-            "host": "is_local is_local_address",
-            "loop": "interrupted_by_signals",
-            "machines": "MachineOption",
-            "network": "Network RouterProcess core_params needs_router write_params",
-            "protocol": "Timeouts",
-            "runner": "Options Runner describe_plan",
-            "supervisor": "LaunchProcess Supervisor",
-        },
-    )
+    __getattr__ = exports_of(__name__)
 
 
 PUBLIC_MODULES = ("report",)

@@ -16,7 +16,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 Action = Callable[[], None]
@@ -205,13 +205,9 @@ def interrupted_by_signals() -> Iterator[None]:
 
 @contextmanager
 def _handled_by(handle: Callable[[int, Any], None]) -> Iterator[None]:
-    before: dict[signal.Signals, Any] = {}
     is_main = threading.current_thread() is threading.main_thread()
-    for number in _SIGNALS if is_main else ():
-        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
-            before[number] = signal.signal(number, handle)
-    try:
+    with ExitStack() as stack:
+        for number in _SIGNALS if is_main else ():
+            if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+                stack.callback(signal.signal, number, signal.signal(number, handle))
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

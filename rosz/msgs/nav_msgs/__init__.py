@@ -9,11 +9,14 @@ MESSAGES: tuple[str, ...] = (
     "GetMapFeedback",
     "GetMapGoal",
     "GetMapResult",
+    "Goals",
     "GridCells",
     "MapMetaData",
     "OccupancyGrid",
     "Odometry",
     "Path",
+    "Trajectory",
+    "TrajectoryPoint",
 )
 SERVICES: tuple[str, ...] = (
     "GetMap",

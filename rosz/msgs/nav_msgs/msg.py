@@ -21,6 +21,7 @@ from rosz.message.runtime import texts as _texts
 from rosz.msgs.actionlib_msgs.msg import GoalID
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.geometry_msgs.msg import Accel
 from rosz.msgs.geometry_msgs.msg import Point
 from rosz.msgs.geometry_msgs.msg import Pose
 from rosz.msgs.geometry_msgs.msg import PoseStamped
@@ -29,6 +30,7 @@ from rosz.msgs.geometry_msgs.msg import Quaternion
 from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.geometry_msgs.msg import TwistWithCovariance
 from rosz.msgs.geometry_msgs.msg import Vector3
+from rosz.msgs.geometry_msgs.msg import Wrench
 from rosz.msgs.std_msgs.msg import Header
 from struct import Struct as _Struct
 from typing import Any as _Any
@@ -41,11 +43,14 @@ __all__ = (
     "GetMapFeedback",
     "GetMapGoal",
     "GetMapResult",
+    "Goals",
     "GridCells",
     "MapMetaData",
     "OccupancyGrid",
     "Odometry",
     "Path",
+    "Trajectory",
+    "TrajectoryPoint",
 )
 
 _p1 = _Struct("<Ix").pack
@@ -695,9 +700,84 @@ class GetMapAction(_Message):
             return _explain(data, GetMapAction)
 
 
-_t12 = _Stride("I i I I $ f f I", -4, 8)
+_t12 = _Stride("I i I I $ I", -4, 8)
+_t13 = _Template("i I I $ d d d d d d d", None)
+_u8 = _Struct("<7d").unpack_from
+
+
+class Goals(_Stamped):
+    """Places for a robot to reach one after the other."""
+
+    header: Header = _field(default_factory=Header)
+    goals: list[PoseStamped] = []
+    _type = "nav_msgs/Goals"
+    _type_name = "nav_msgs/msg/Goals"
+    _type_hash = "RIHS01_02305a51633b5c04d8979b878a7577cafd422f8a07465c878b17a920af3759e9"
+    _md5sum = "b6d155852224fbcb2cf7b2c98d5b37a7"
+    _text = (
+        "# Places for a robot to reach one after the other.\n"
+        "\n"
+        "std_msgs/Header header\n"
+        "geometry_msgs/PoseStamped[] goals\n"
+    )
+    _schema = (("header", Header, ""), ("goals", PoseStamped, "[]"))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            header = m.header
+            stamp = header.stamp
+            n1, b1 = _texts[header.frame_id]
+            goals = m.goals
+            n2 = len(goals)
+            f3, p4 = _t12[n1]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p5 = p4
+            for goals_one in goals:
+                header_2 = goals_one.header
+                stamp_2 = header_2.stamp
+                n6, b6 = _texts[header_2.frame_id]
+                pose = goals_one.pose
+                position = pose.position
+                orientation = pose.orientation
+                out.append(_t13[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x,
+                    position.y, position.z, orientation.x, orientation.y, orientation.z,
+                    orientation.w))
+                p5 = 0
+            return b"".join(out)
+        except _FAULTS:
+            return _plain(m, Goals)
+
+    @staticmethod
+    def _decode(data: bytes) -> Goals:
+        try:
+            h, sec, nanosec, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 16 + n1
+            frame_id = data[16 : p - 1].decode()
+            p = p + 3 & -4
+            (n2,) = _u7(data, p)
+            goals = []
+            p = p + 4
+            for _ in range(n2):
+                sec_2, nanosec_2, n3 = _u3(data, p)
+                q = p + 12
+                p = q + n3
+                frame_id_2 = data[q : p - 1].decode()
+                p = (p + 3 | 7) - 3
+                x, y, z, x_2, y_2, z_2, w = _u8(data, p)
+                p += 56
+                goals.append(PoseStamped(Header(0, Time(sec_2, nanosec_2), frame_id_2),
+                    Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))))
+            if p > len(data): raise ValueError
+            return Goals(Header(0, Time(sec, nanosec), frame_id), goals)
+        except _FAULTS:
+            return _explain(data, Goals)
+
+
+_t14 = _Stride("I i I I $ f f I", -4, 8)
 _p3 = _Struct("<3d").pack
-_u8 = _Struct("<2fI").unpack_from
+_u9 = _Struct("<2fI").unpack_from
 _i1 = _Struct("<3d").iter_unpack
 
 
@@ -731,7 +811,7 @@ class GridCells(_Stamped):
             n1, b1 = _texts[header.frame_id]
             cells = m.cells
             n2 = len(cells)
-            f3, p4 = _t12[n1]
+            f3, p4 = _t14[n1]
             p5 = 0 if n2 else p4
             return b"".join((f3(256, stamp.sec, stamp.nanosec, n1, b1, m.cell_width, m.cell_height,
                 n2), (_PADDING[-(p4) & 7] if n2 else b""),
@@ -747,7 +827,7 @@ class GridCells(_Stamped):
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             p = p + 3 & -4
-            cell_width, cell_height, n2 = _u8(data, p)
+            cell_width, cell_height, n2 = _u9(data, p)
             q = (p + 15 | 7) - 3 if n2 else p + 12
             p = q + n2 * 24
             cells = list(_starmap(Point, _i1(data[q : p])))
@@ -758,9 +838,8 @@ class GridCells(_Stamped):
             return _explain(data, GridCells)
 
 
-_t13 = _Template("I i I I $ I $ d d d d d d d", -4)
+_t15 = _Template("I i I I $ I $ d d d d d d d", -4)
 _p4 = _Struct("<6d").pack
-_u9 = _Struct("<7d").unpack_from
 _u10 = _Struct("<6d").unpack_from
 
 
@@ -815,7 +894,7 @@ class Odometry(_Stamped):
                 or len(covariance_2) != 36
             ):
                 n4, covariance_2 = _numbers(covariance_2, "d", 36)
-            return b"".join((_t13[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2,
+            return b"".join((_t15[n1, n2](256, stamp.sec, stamp.nanosec, n1, b1, n2, b2,
                 position.x, position.y, position.z, orientation.x, orientation.y, orientation.z,
                 orientation.w), covariance,
                 _p4(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), covariance_2))
@@ -835,7 +914,7 @@ class Odometry(_Stamped):
             p = q + n2
             child_frame_id = data[q : p - 1].decode()
             p = (p + 3 | 7) - 3
-            x, y, z, x_2, y_2, z_2, w = _u9(data, p)
+            x, y, z, x_2, y_2, z_2, w = _u8(data, p)
             q = p + 56
             p = q + 288
             covariance = _array("d", data[q : p])
@@ -850,10 +929,6 @@ class Odometry(_Stamped):
                 covariance_2))
         except _FAULTS:
             return _explain(data, Odometry)
-
-
-_t14 = _Stride("I i I I $ I", -4, 8)
-_t15 = _Template("i I I $ d d d d d d d", None)
 
 
 class Path(_Stamped):
@@ -881,7 +956,7 @@ class Path(_Stamped):
             n1, b1 = _texts[header.frame_id]
             poses = m.poses
             n2 = len(poses)
-            f3, p4 = _t14[n1]
+            f3, p4 = _t12[n1]
             out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
             p5 = p4
             for poses_one in poses:
@@ -891,7 +966,7 @@ class Path(_Stamped):
                 pose = poses_one.pose
                 position = pose.position
                 orientation = pose.orientation
-                out.append(_t15[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x,
+                out.append(_t13[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x,
                     position.y, position.z, orientation.x, orientation.y, orientation.z,
                     orientation.w))
                 p5 = 0
@@ -916,7 +991,7 @@ class Path(_Stamped):
                 p = q + n3
                 frame_id_2 = data[q : p - 1].decode()
                 p = (p + 3 | 7) - 3
-                x, y, z, x_2, y_2, z_2, w = _u9(data, p)
+                x, y, z, x_2, y_2, z_2, w = _u8(data, p)
                 p += 56
                 poses.append(PoseStamped(Header(0, Time(sec_2, nanosec_2), frame_id_2),
                     Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w))))
@@ -924,3 +999,164 @@ class Path(_Stamped):
             return Path(Header(0, Time(sec, nanosec), frame_id), poses)
         except _FAULTS:
             return _explain(data, Path)
+
+
+_t16 = _Template("I i I I $ d d d d d d d d d d d d d d d d d d d d d d d d d", -4)
+_u11 = _Struct("<25d").unpack_from
+
+
+class TrajectoryPoint(_Stamped):
+    """What a robot shall do at one moment of a Trajectory."""
+
+    header: Header = _field(default_factory=Header)
+    pose: Pose = _field(default_factory=Pose)
+    velocity: Twist = _field(default_factory=Twist)
+    acceleration: Accel = _field(default_factory=Accel)
+    effort: Wrench = _field(default_factory=Wrench)
+    _type = "nav_msgs/TrajectoryPoint"
+    _type_name = "nav_msgs/msg/TrajectoryPoint"
+    _type_hash = "RIHS01_f0861d4358bd21bf3fc1372a490ad3ae9cac4df45461f9f772cea2a9ad71587c"
+    _md5sum = "4b35dffc92fae817db9a873de95483b9"
+    _text = (
+        "# What a robot shall do at one moment of a Trajectory.\n"
+        "\n"
+        "std_msgs/Header header             # the moment, and the frame of the pose\n"
+        "geometry_msgs/Pose pose\n"
+        "geometry_msgs/Twist velocity       # in the frame of the robot\n"
+        "geometry_msgs/Accel acceleration   # likewise\n"
+        "geometry_msgs/Wrench effort        # likewise; force and torque that this takes\n"
+    )
+    _schema = (("header", Header, ""), ("pose", Pose, ""), ("velocity", Twist, ""),
+        ("acceleration", Accel, ""), ("effort", Wrench, ""))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            header = m.header
+            stamp = header.stamp
+            n1, b1 = _texts[header.frame_id]
+            pose = m.pose
+            position = pose.position
+            orientation = pose.orientation
+            velocity = m.velocity
+            linear = velocity.linear
+            angular = velocity.angular
+            acceleration = m.acceleration
+            linear_2 = acceleration.linear
+            angular_2 = acceleration.angular
+            effort = m.effort
+            force = effort.force
+            torque = effort.torque
+            return _t16[n1](256, stamp.sec, stamp.nanosec, n1, b1, position.x, position.y,
+                position.z, orientation.x, orientation.y, orientation.z, orientation.w, linear.x,
+                linear.y, linear.z, angular.x, angular.y, angular.z, linear_2.x, linear_2.y,
+                linear_2.z, angular_2.x, angular_2.y, angular_2.z, force.x, force.y, force.z,
+                torque.x, torque.y, torque.z)
+        except _FAULTS:
+            return _plain(m, TrajectoryPoint)
+
+    @staticmethod
+    def _decode(data: bytes) -> TrajectoryPoint:
+        try:
+            h, sec, nanosec, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 16 + n1
+            frame_id = data[16 : p - 1].decode()
+            p = (p + 3 | 7) - 3
+            (x, y, z, x_2, y_2, z_2, w, x_3, y_3, z_3, x_4, y_4, z_4, x_5, y_5, z_5, x_6, y_6, z_6,
+                x_7, y_7, z_7, x_8, y_8, z_8) = _u11(data, p)
+            return TrajectoryPoint(Header(0, Time(sec, nanosec), frame_id),
+                Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)),
+                Twist(Vector3(x_3, y_3, z_3), Vector3(x_4, y_4, z_4)),
+                Accel(Vector3(x_5, y_5, z_5), Vector3(x_6, y_6, z_6)),
+                Wrench(Vector3(x_7, y_7, z_7), Vector3(x_8, y_8, z_8)))
+        except _FAULTS:
+            return _explain(data, TrajectoryPoint)
+
+
+_t17 = _Template("i I I $ d d d d d d d d d d d d d d d d d d d d d d d d d", None)
+
+
+class Trajectory(_Stamped):
+    """A path with the motion along it: where a robot shall be when, and how fast."""
+
+    header: Header = _field(default_factory=Header)
+    points: list[TrajectoryPoint] = []
+    _type = "nav_msgs/Trajectory"
+    _type_name = "nav_msgs/msg/Trajectory"
+    _type_hash = "RIHS01_d3913ce7dde2bcfce38a35aa69952c5e5e9abd274a4f85d5c46f16d875c04d83"
+    _md5sum = "8c967781e55de1d382f541fe4d214c68"
+    _text = (
+        "# A path with the motion along it: where a robot shall be when, and how fast.\n"
+        "\n"
+        "std_msgs/Header header\n"
+        "TrajectoryPoint[] points  # in the order of their stamps\n"
+    )
+    _schema = (("header", Header, ""), ("points", TrajectoryPoint, "[]"))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            header = m.header
+            stamp = header.stamp
+            n1, b1 = _texts[header.frame_id]
+            points = m.points
+            n2 = len(points)
+            f3, p4 = _t12[n1]
+            out = [f3(256, stamp.sec, stamp.nanosec, n1, b1, n2)]
+            p5 = p4
+            for points_one in points:
+                header_2 = points_one.header
+                stamp_2 = header_2.stamp
+                n6, b6 = _texts[header_2.frame_id]
+                pose = points_one.pose
+                position = pose.position
+                orientation = pose.orientation
+                velocity = points_one.velocity
+                linear = velocity.linear
+                angular = velocity.angular
+                acceleration = points_one.acceleration
+                linear_2 = acceleration.linear
+                angular_2 = acceleration.angular
+                effort = points_one.effort
+                force = effort.force
+                torque = effort.torque
+                out.append(_t17[p5, n6](stamp_2.sec, stamp_2.nanosec, n6, b6, position.x,
+                    position.y, position.z, orientation.x, orientation.y, orientation.z,
+                    orientation.w, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+                    linear_2.x, linear_2.y, linear_2.z, angular_2.x, angular_2.y, angular_2.z,
+                    force.x, force.y, force.z, torque.x, torque.y, torque.z))
+                p5 = 0
+            return b"".join(out)
+        except _FAULTS:
+            return _plain(m, Trajectory)
+
+    @staticmethod
+    def _decode(data: bytes) -> Trajectory:
+        try:
+            h, sec, nanosec, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 16 + n1
+            frame_id = data[16 : p - 1].decode()
+            p = p + 3 & -4
+            (n2,) = _u7(data, p)
+            points = []
+            p = p + 4
+            for _ in range(n2):
+                sec_2, nanosec_2, n3 = _u3(data, p)
+                q = p + 12
+                p = q + n3
+                frame_id_2 = data[q : p - 1].decode()
+                p = (p + 3 | 7) - 3
+                (x, y, z, x_2, y_2, z_2, w, x_3, y_3, z_3, x_4, y_4, z_4, x_5, y_5, z_5, x_6, y_6,
+                    z_6, x_7, y_7, z_7, x_8, y_8, z_8) = _u11(data, p)
+                p += 200
+                points.append(TrajectoryPoint(Header(0, Time(sec_2, nanosec_2), frame_id_2),
+                    Pose(Point(x, y, z), Quaternion(x_2, y_2, z_2, w)),
+                    Twist(Vector3(x_3, y_3, z_3), Vector3(x_4, y_4, z_4)),
+                    Accel(Vector3(x_5, y_5, z_5), Vector3(x_6, y_6, z_6)),
+                    Wrench(Vector3(x_7, y_7, z_7), Vector3(x_8, y_8, z_8))))
+            if p > len(data): raise ValueError
+            return Trajectory(Header(0, Time(sec, nanosec), frame_id), points)
+        except _FAULTS:
+            return _explain(data, Trajectory)

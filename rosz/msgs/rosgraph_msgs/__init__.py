@@ -2,9 +2,17 @@
 """Interfaces of rosgraph_msgs."""
 
 MESSAGES: tuple[str, ...] = (
+    "Action",
     "Clock",
+    "Graph",
+    "InterfaceType",
     "Log",
+    "Node",
+    "QoSProfile",
+    "Service",
+    "Topic",
     "TopicStatistics",
+    "TypeHash",
 )
 SERVICES: tuple[str, ...] = ()
 ACTIONS: tuple[str, ...] = ()

@@ -3,30 +3,697 @@
 
 from __future__ import annotations
 
+from array import array as _array
+from itertools import starmap as _starmap
 from msgspec import field as _field
+from rosz.message import Bytes as _Bytes
 from rosz.message import Message as _Message
 from rosz.message import Stamped as _Stamped
 from rosz.message.runtime import FAULTS as _FAULTS
+from rosz.message.runtime import PADDING as _PADDING
 from rosz.message.runtime import Stride as _Stride
 from rosz.message.runtime import StringList as _StringList
+from rosz.message.runtime import TRUTH as _TRUTH
 from rosz.message.runtime import Template as _Template
 from rosz.message.runtime import decode_plainly as _explain
 from rosz.message.runtime import encode_plainly as _plain
+from rosz.message.runtime import flags as _flags
+from rosz.message.runtime import numbers as _numbers
+from rosz.message.runtime import octets as _octets
+from rosz.message.runtime import read_block as _read_block
+from rosz.message.runtime import read_flags as _read_flags
 from rosz.message.runtime import texts as _texts
 from rosz.msgs.builtin_interfaces.msg import Duration
 from rosz.msgs.builtin_interfaces.msg import Time
+from rosz.msgs.rcl_interfaces.msg import FloatingPointRange
+from rosz.msgs.rcl_interfaces.msg import IntegerRange
+from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor
+from rosz.msgs.rcl_interfaces.msg import ParameterValue
 from rosz.msgs.std_msgs.msg import Header
 from struct import Struct as _Struct
 from typing import Any as _Any
 
 __all__ = (
+    "Action",
     "Clock",
+    "Graph",
+    "InterfaceType",
     "Log",
+    "Node",
+    "QoSProfile",
+    "Service",
+    "Topic",
     "TopicStatistics",
+    "TypeHash",
 )
 
-_p1 = _Struct("<IiI").pack
-_u1 = _Struct("<IiI").unpack_from
+_z1 = bytes(32)
+_p1 = _Struct("<IB32s").pack
+_u1 = _Struct("<IB32s").unpack_from
+
+
+class TypeHash(_Message):
+    """The hash of the definition of a type, which is written RIHS01_ and hexadecimal digits."""
+
+    version: int = 0
+    value: _Bytes = _z1
+    _type = "rosgraph_msgs/TypeHash"
+    _type_name = "rosgraph_msgs/msg/TypeHash"
+    _type_hash = "RIHS01_b57248b9d4ea0964bd583c53ae3b94354e599b8183a135af48826287bef3c1f6"
+    _md5sum = "0e19d24f7b06b382f02e9e6010a4b047"
+    _text = (
+        "# The hash of the definition of a type, which is written RIHS01_ and hexadecimal digits.\n"
+        "\n"
+        "uint8 version     # of the way in which it is computed\n"
+        "uint8[32] value\n"
+    )
+    _schema = (("version", "uint8", ""), ("value", "uint8", "[32]"))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            value = m.value
+            if type(value) is not bytes or len(value) != 32:
+                value = bytes(_octets(value, 32))
+            return _p1(256, m.version, value)
+        except _FAULTS:
+            return _plain(m, TypeHash)
+
+    @staticmethod
+    def _decode(data: bytes) -> TypeHash:
+        try:
+            h, version, value = _u1(data)
+            if h != 256: raise ValueError
+            return TypeHash(version, value)
+        except _FAULTS:
+            return _explain(data, TypeHash)
+
+
+_t1 = _Stride("I I $ B 32s", -4, 4)
+_u2 = _Struct("<2I").unpack_from
+_u3 = _Struct("<B32s").unpack_from
+
+
+class InterfaceType(_Message):
+    """A type of messages or services."""
+
+    name: str = ""
+    hash: TypeHash = _field(default_factory=TypeHash)
+    _type = "rosgraph_msgs/InterfaceType"
+    _type_name = "rosgraph_msgs/msg/InterfaceType"
+    _type_hash = "RIHS01_08e222a0b6950d275c45c2924b6bb6b79b7fdede9c90cdf5d6952dc6f197916c"
+    _md5sum = "c06603e4bbaf94e404b990430a82a902"
+    _text = (
+        "# A type of messages or services.\n"
+        "\n"
+        "string name    # such as std_msgs/msg/String\n"
+        "TypeHash hash\n"
+    )
+    _schema = (("name", "string", ""), ("hash", TypeHash, ""))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            n1, b1 = _texts[m.name]
+            hash_2 = m.hash
+            value = hash_2.value
+            if type(value) is not bytes or len(value) != 32:
+                value = bytes(_octets(value, 32))
+            f2, p3 = _t1[n1]
+            return f2(256, n1, b1, hash_2.version, value)
+        except _FAULTS:
+            return _plain(m, InterfaceType)
+
+    @staticmethod
+    def _decode(data: bytes) -> InterfaceType:
+        try:
+            h, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 8 + n1
+            name = data[8 : p - 1].decode()
+            version, value = _u3(data, p)
+            return InterfaceType(name, TypeHash(version, value))
+        except _FAULTS:
+            return _explain(data, InterfaceType)
+
+
+_p2 = _Struct("<2IiIiI4BiI").pack
+_u4 = _Struct("<2IiIiI4BiI").unpack_from
+
+
+class QoSProfile(_Message):
+    """The quality of service of a publisher, subscription, service or client."""
+
+    depth: int = 0
+    deadline: Duration = _field(default_factory=Duration)
+    lifespan: Duration = _field(default_factory=Duration)
+    history: int = 0
+    reliability: int = 0
+    durability: int = 0
+    liveliness: int = 0
+    liveliness_lease_duration: Duration = _field(default_factory=Duration)
+    HISTORY_SYSTEM_DEFAULT = 0
+    HISTORY_KEEP_LAST = 1
+    HISTORY_KEEP_ALL = 2
+    HISTORY_UNKNOWN = 3
+    RELIABILITY_SYSTEM_DEFAULT = 0
+    RELIABILITY_RELIABLE = 1
+    RELIABILITY_BEST_EFFORT = 2
+    RELIABILITY_UNKNOWN = 3
+    RELIABILITY_BEST_AVAILABLE = 4
+    DURABILITY_SYSTEM_DEFAULT = 0
+    DURABILITY_TRANSIENT_LOCAL = 1
+    DURABILITY_VOLATILE = 2
+    DURABILITY_UNKNOWN = 3
+    DURABILITY_BEST_AVAILABLE = 4
+    LIVELINESS_SYSTEM_DEFAULT = 0
+    LIVELINESS_AUTOMATIC = 1
+    LIVELINESS_MANUAL_BY_TOPIC = 3
+    LIVELINESS_UNKNOWN = 4
+    LIVELINESS_BEST_AVAILABLE = 5
+    _type = "rosgraph_msgs/QoSProfile"
+    _type_name = "rosgraph_msgs/msg/QoSProfile"
+    _type_hash = "RIHS01_0c83305c2c647eecbf3a0ad549c121d6cf12606d902915a28e904d8f2aba42ee"
+    _md5sum = "7db08aedeeae167742e244a718530561"
+    _text = (
+        "# The quality of service of a publisher, subscription, service or client.\n"
+        "\n"
+        "uint8 HISTORY_SYSTEM_DEFAULT=0\n"
+        "uint8 HISTORY_KEEP_LAST=1\n"
+        "uint8 HISTORY_KEEP_ALL=2\n"
+        "uint8 HISTORY_UNKNOWN=3\n"
+        "\n"
+        "uint8 RELIABILITY_SYSTEM_DEFAULT=0\n"
+        "uint8 RELIABILITY_RELIABLE=1\n"
+        "uint8 RELIABILITY_BEST_EFFORT=2\n"
+        "uint8 RELIABILITY_UNKNOWN=3\n"
+        "uint8 RELIABILITY_BEST_AVAILABLE=4  # whatever the other end has\n"
+        "\n"
+        "uint8 DURABILITY_SYSTEM_DEFAULT=0\n"
+        "uint8 DURABILITY_TRANSIENT_LOCAL=1\n"
+        "uint8 DURABILITY_VOLATILE=2\n"
+        "uint8 DURABILITY_UNKNOWN=3\n"
+        "uint8 DURABILITY_BEST_AVAILABLE=4\n"
+        "\n"
+        "uint8 LIVELINESS_SYSTEM_DEFAULT=0\n"
+        "uint8 LIVELINESS_AUTOMATIC=1\n"
+        "uint8 LIVELINESS_MANUAL_BY_TOPIC=3\n"
+        "uint8 LIVELINESS_UNKNOWN=4\n"
+        "uint8 LIVELINESS_BEST_AVAILABLE=5\n"
+        "\n"
+        "uint32 depth                        # messages kept, with HISTORY_KEEP_LAST\n"
+        "builtin_interfaces/Duration deadline\n"
+        "builtin_interfaces/Duration lifespan\n"
+        "uint8 history                       # this and the next three: constants above\n"
+        "uint8 reliability\n"
+        "uint8 durability\n"
+        "uint8 liveliness\n"
+        "builtin_interfaces/Duration liveliness_lease_duration\n"
+    )
+    _schema = (("depth", "uint32", ""), ("deadline", Duration, ""), ("lifespan", Duration, ""),
+        ("history", "uint8", ""), ("reliability", "uint8", ""), ("durability", "uint8", ""),
+        ("liveliness", "uint8", ""), ("liveliness_lease_duration", Duration, ""))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            deadline = m.deadline
+            lifespan = m.lifespan
+            liveliness_lease_duration = m.liveliness_lease_duration
+            return _p2(256, m.depth, deadline.sec, deadline.nanosec, lifespan.sec,
+                lifespan.nanosec, m.history, m.reliability, m.durability, m.liveliness,
+                liveliness_lease_duration.sec, liveliness_lease_duration.nanosec)
+        except _FAULTS:
+            return _plain(m, QoSProfile)
+
+    @staticmethod
+    def _decode(data: bytes) -> QoSProfile:
+        try:
+            (h, depth, sec, nanosec, sec_2, nanosec_2, history, reliability, durability,
+                liveliness, sec_3, nanosec_3) = _u4(data)
+            if h != 256: raise ValueError
+            return QoSProfile(depth, Duration(sec, nanosec), Duration(sec_2, nanosec_2), history,
+                reliability, durability, liveliness, Duration(sec_3, nanosec_3))
+        except _FAULTS:
+            return _explain(data, QoSProfile)
+
+
+_t2 = _Template("I I $ I $ B 32s I i I i I B B B B i I", -4)
+_t3 = _Template("I $ B 32s I i I i I B B B B i I", 0)
+_u5 = _Struct("<I").unpack_from
+_u6 = _Struct("<IiIiI4Bi2I").unpack_from
+_u7 = _Struct("<IiIiI4BiI").unpack_from
+
+
+class Service(_Message):
+    """A service as its server or one of its clients has it."""
+
+    name: str = ""
+    request_type: InterfaceType = _field(default_factory=InterfaceType)
+    request_qos: QoSProfile = _field(default_factory=QoSProfile)
+    response_type: InterfaceType = _field(default_factory=InterfaceType)
+    response_qos: QoSProfile = _field(default_factory=QoSProfile)
+    _type = "rosgraph_msgs/Service"
+    _type_name = "rosgraph_msgs/msg/Service"
+    _type_hash = "RIHS01_01a80e1dc066d6f37846e00029710c39cfdfd8c807be16f8f6181f5834f5c679"
+    _md5sum = "73b0210bd195a989e3bdb6078c7de575"
+    _text = (
+        "# A service as its server or one of its clients has it.\n"
+        "\n"
+        "string name\n"
+        "InterfaceType request_type\n"
+        "QoSProfile request_qos\n"
+        "InterfaceType response_type\n"
+        "QoSProfile response_qos\n"
+    )
+    _schema = (("name", "string", ""), ("request_type", InterfaceType, ""),
+        ("request_qos", QoSProfile, ""), ("response_type", InterfaceType, ""),
+        ("response_qos", QoSProfile, ""))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            n1, b1 = _texts[m.name]
+            request_type = m.request_type
+            n2, b2 = _texts[request_type.name]
+            hash_2 = request_type.hash
+            value = hash_2.value
+            if type(value) is not bytes or len(value) != 32:
+                value = bytes(_octets(value, 32))
+            request_qos = m.request_qos
+            deadline = request_qos.deadline
+            lifespan = request_qos.lifespan
+            liveliness_lease_duration = request_qos.liveliness_lease_duration
+            response_type = m.response_type
+            n3, b3 = _texts[response_type.name]
+            hash_3 = response_type.hash
+            value_2 = hash_3.value
+            if type(value_2) is not bytes or len(value_2) != 32:
+                value_2 = bytes(_octets(value_2, 32))
+            response_qos = m.response_qos
+            deadline_2 = response_qos.deadline
+            lifespan_2 = response_qos.lifespan
+            liveliness_lease_duration_2 = response_qos.liveliness_lease_duration
+            return b"".join((_t2[n1, n2](256, n1, b1, n2, b2, hash_2.version, value,
+                request_qos.depth, deadline.sec, deadline.nanosec, lifespan.sec, lifespan.nanosec,
+                request_qos.history, request_qos.reliability, request_qos.durability,
+                request_qos.liveliness, liveliness_lease_duration.sec,
+                liveliness_lease_duration.nanosec),
+                _t3[n3](n3, b3, hash_3.version, value_2, response_qos.depth, deadline_2.sec,
+                deadline_2.nanosec, lifespan_2.sec, lifespan_2.nanosec, response_qos.history,
+                response_qos.reliability, response_qos.durability, response_qos.liveliness,
+                liveliness_lease_duration_2.sec, liveliness_lease_duration_2.nanosec)))
+        except _FAULTS:
+            return _plain(m, Service)
+
+    @staticmethod
+    def _decode(data: bytes) -> Service:
+        try:
+            h, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 8 + n1
+            name = data[8 : p - 1].decode()
+            p = p + 3 & -4
+            (n2,) = _u5(data, p)
+            q = p + 4
+            p = q + n2
+            name_2 = data[q : p - 1].decode()
+            version, value = _u3(data, p)
+            p = p + 36 & -4
+            (depth, sec, nanosec, sec_2, nanosec_2, history, reliability, durability, liveliness,
+                sec_3, nanosec_3, n3) = _u6(data, p)
+            q = p + 36
+            p = q + n3
+            name_3 = data[q : p - 1].decode()
+            version_2, value_2 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_2, sec_4, nanosec_4, sec_5, nanosec_5, history_2, reliability_2, durability_2,
+                liveliness_2, sec_6, nanosec_6) = _u7(data, p)
+            return Service(name, InterfaceType(name_2, TypeHash(version, value)),
+                QoSProfile(depth, Duration(sec, nanosec), Duration(sec_2, nanosec_2), history,
+                reliability, durability, liveliness, Duration(sec_3, nanosec_3)),
+                InterfaceType(name_3, TypeHash(version_2, value_2)),
+                QoSProfile(depth_2, Duration(sec_4, nanosec_4), Duration(sec_5, nanosec_5),
+                history_2, reliability_2, durability_2, liveliness_2, Duration(sec_6, nanosec_6)))
+        except _FAULTS:
+            return _explain(data, Service)
+
+
+class Topic(_Message):
+    """A topic as one of its publishers or subscriptions has it."""
+
+    name: str = ""
+    type: InterfaceType = _field(default_factory=InterfaceType)
+    qos: QoSProfile = _field(default_factory=QoSProfile)
+    _type = "rosgraph_msgs/Topic"
+    _type_name = "rosgraph_msgs/msg/Topic"
+    _type_hash = "RIHS01_e378dfc444e3e04c76ffdda3caa997f107b6f2d9ba059fcf09b2f39433a149e4"
+    _md5sum = "ee03bd04ad7ca784082d70cc4aac8b0d"
+    _text = (
+        "# A topic as one of its publishers or subscriptions has it.\n"
+        "\n"
+        "string name\n"
+        "InterfaceType type\n"
+        "QoSProfile qos\n"
+    )
+    _schema = (("name", "string", ""), ("type", InterfaceType, ""), ("qos", QoSProfile, ""))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            n1, b1 = _texts[m.name]
+            type_2 = m.type
+            n2, b2 = _texts[type_2.name]
+            hash_2 = type_2.hash
+            value = hash_2.value
+            if type(value) is not bytes or len(value) != 32:
+                value = bytes(_octets(value, 32))
+            qos = m.qos
+            deadline = qos.deadline
+            lifespan = qos.lifespan
+            liveliness_lease_duration = qos.liveliness_lease_duration
+            return _t2[n1, n2](256, n1, b1, n2, b2, hash_2.version, value, qos.depth, deadline.sec,
+                deadline.nanosec, lifespan.sec, lifespan.nanosec, qos.history, qos.reliability,
+                qos.durability, qos.liveliness, liveliness_lease_duration.sec,
+                liveliness_lease_duration.nanosec)
+        except _FAULTS:
+            return _plain(m, Topic)
+
+    @staticmethod
+    def _decode(data: bytes) -> Topic:
+        try:
+            h, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 8 + n1
+            name = data[8 : p - 1].decode()
+            p = p + 3 & -4
+            (n2,) = _u5(data, p)
+            q = p + 4
+            p = q + n2
+            name_2 = data[q : p - 1].decode()
+            version, value = _u3(data, p)
+            p = p + 36 & -4
+            (depth, sec, nanosec, sec_2, nanosec_2, history, reliability, durability, liveliness,
+                sec_3, nanosec_3) = _u7(data, p)
+            return Topic(name, InterfaceType(name_2, TypeHash(version, value)),
+                QoSProfile(depth, Duration(sec, nanosec), Duration(sec_2, nanosec_2), history,
+                reliability, durability, liveliness, Duration(sec_3, nanosec_3)))
+        except _FAULTS:
+            return _explain(data, Topic)
+
+
+_t4 = _Stride("I I $ I $", -4, 4)
+_t5 = _Template("I $ B 32s I i I i I B B B B i I I $ B 32s I i I i I B B B B i I", None)
+_t6 = _Template("I $ I $ B 32s I i I i I B B B B i I", 0)
+_t7 = _Stride("I $ B 32s I i I i I B B B B i I I $", 0, 4)
+
+
+class Action(_Message):
+    """An action as its server or one of its clients has it: the services and topics that it is made of."""
+
+    name: str = ""
+    send_goal: Service = _field(default_factory=Service)
+    get_result: Service = _field(default_factory=Service)
+    cancel_goal: Service = _field(default_factory=Service)
+    feedback: Topic = _field(default_factory=Topic)
+    status: Topic = _field(default_factory=Topic)
+    _type = "rosgraph_msgs/Action"
+    _type_name = "rosgraph_msgs/msg/Action"
+    _type_hash = "RIHS01_221c3b8d63470add1ea70231a2c5c3488bd0a11fab7f4b87bbf06ad341062e39"
+    _md5sum = "6279c15965b3613f8b108c6f84957822"
+    _text = (
+        "# An action as its server or one of its clients has it: the services and topics that it is made of.\n"
+        "\n"
+        "string name\n"
+        "Service send_goal\n"
+        "Service get_result\n"
+        "Service cancel_goal\n"
+        "Topic feedback\n"
+        "Topic status\n"
+    )
+    _schema = (("name", "string", ""), ("send_goal", Service, ""), ("get_result", Service, ""),
+        ("cancel_goal", Service, ""), ("feedback", Topic, ""), ("status", Topic, ""))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            n1, b1 = _texts[m.name]
+            send_goal = m.send_goal
+            n2, b2 = _texts[send_goal.name]
+            request_type = send_goal.request_type
+            n3, b3 = _texts[request_type.name]
+            f4, p5 = _t4[n1, n2]
+            hash_2 = request_type.hash
+            value = hash_2.value
+            if type(value) is not bytes or len(value) != 32:
+                value = bytes(_octets(value, 32))
+            request_qos = send_goal.request_qos
+            deadline = request_qos.deadline
+            lifespan = request_qos.lifespan
+            liveliness_lease_duration = request_qos.liveliness_lease_duration
+            response_type = send_goal.response_type
+            n6, b6 = _texts[response_type.name]
+            hash_3 = response_type.hash
+            value_2 = hash_3.value
+            if type(value_2) is not bytes or len(value_2) != 32:
+                value_2 = bytes(_octets(value_2, 32))
+            response_qos = send_goal.response_qos
+            deadline_2 = response_qos.deadline
+            lifespan_2 = response_qos.lifespan
+            liveliness_lease_duration_2 = response_qos.liveliness_lease_duration
+            get_result = m.get_result
+            n7, b7 = _texts[get_result.name]
+            request_type_2 = get_result.request_type
+            n8, b8 = _texts[request_type_2.name]
+            hash_4 = request_type_2.hash
+            value_3 = hash_4.value
+            if type(value_3) is not bytes or len(value_3) != 32:
+                value_3 = bytes(_octets(value_3, 32))
+            request_qos_2 = get_result.request_qos
+            deadline_3 = request_qos_2.deadline
+            lifespan_3 = request_qos_2.lifespan
+            liveliness_lease_duration_3 = request_qos_2.liveliness_lease_duration
+            response_type_2 = get_result.response_type
+            n9, b9 = _texts[response_type_2.name]
+            hash_5 = response_type_2.hash
+            value_4 = hash_5.value
+            if type(value_4) is not bytes or len(value_4) != 32:
+                value_4 = bytes(_octets(value_4, 32))
+            response_qos_2 = get_result.response_qos
+            deadline_4 = response_qos_2.deadline
+            lifespan_4 = response_qos_2.lifespan
+            liveliness_lease_duration_4 = response_qos_2.liveliness_lease_duration
+            cancel_goal = m.cancel_goal
+            n10, b10 = _texts[cancel_goal.name]
+            request_type_3 = cancel_goal.request_type
+            n11, b11 = _texts[request_type_3.name]
+            f12, p13 = _t7[n9, n10]
+            hash_6 = request_type_3.hash
+            value_5 = hash_6.value
+            if type(value_5) is not bytes or len(value_5) != 32:
+                value_5 = bytes(_octets(value_5, 32))
+            request_qos_3 = cancel_goal.request_qos
+            deadline_5 = request_qos_3.deadline
+            lifespan_5 = request_qos_3.lifespan
+            liveliness_lease_duration_5 = request_qos_3.liveliness_lease_duration
+            response_type_3 = cancel_goal.response_type
+            n14, b14 = _texts[response_type_3.name]
+            hash_7 = response_type_3.hash
+            value_6 = hash_7.value
+            if type(value_6) is not bytes or len(value_6) != 32:
+                value_6 = bytes(_octets(value_6, 32))
+            response_qos_3 = cancel_goal.response_qos
+            deadline_6 = response_qos_3.deadline
+            lifespan_6 = response_qos_3.lifespan
+            liveliness_lease_duration_6 = response_qos_3.liveliness_lease_duration
+            feedback = m.feedback
+            n15, b15 = _texts[feedback.name]
+            type_2 = feedback.type
+            n16, b16 = _texts[type_2.name]
+            hash_8 = type_2.hash
+            value_7 = hash_8.value
+            if type(value_7) is not bytes or len(value_7) != 32:
+                value_7 = bytes(_octets(value_7, 32))
+            qos = feedback.qos
+            deadline_7 = qos.deadline
+            lifespan_7 = qos.lifespan
+            liveliness_lease_duration_7 = qos.liveliness_lease_duration
+            status = m.status
+            n17, b17 = _texts[status.name]
+            type_3 = status.type
+            n18, b18 = _texts[type_3.name]
+            hash_9 = type_3.hash
+            value_8 = hash_9.value
+            if type(value_8) is not bytes or len(value_8) != 32:
+                value_8 = bytes(_octets(value_8, 32))
+            qos_2 = status.qos
+            deadline_8 = qos_2.deadline
+            lifespan_8 = qos_2.lifespan
+            liveliness_lease_duration_8 = qos_2.liveliness_lease_duration
+            return b"".join((f4(256, n1, b1, n2, b2),
+                _t5[p5, n3, n6](n3, b3, hash_2.version, value, request_qos.depth, deadline.sec,
+                deadline.nanosec, lifespan.sec, lifespan.nanosec, request_qos.history,
+                request_qos.reliability, request_qos.durability, request_qos.liveliness,
+                liveliness_lease_duration.sec, liveliness_lease_duration.nanosec, n6, b6,
+                hash_3.version, value_2, response_qos.depth, deadline_2.sec, deadline_2.nanosec,
+                lifespan_2.sec, lifespan_2.nanosec, response_qos.history, response_qos.reliability,
+                response_qos.durability, response_qos.liveliness, liveliness_lease_duration_2.sec,
+                liveliness_lease_duration_2.nanosec),
+                _t6[n7, n8](n7, b7, n8, b8, hash_4.version, value_3, request_qos_2.depth,
+                deadline_3.sec, deadline_3.nanosec, lifespan_3.sec, lifespan_3.nanosec,
+                request_qos_2.history, request_qos_2.reliability, request_qos_2.durability,
+                request_qos_2.liveliness, liveliness_lease_duration_3.sec,
+                liveliness_lease_duration_3.nanosec),
+                f12(n9, b9, hash_5.version, value_4, response_qos_2.depth, deadline_4.sec,
+                deadline_4.nanosec, lifespan_4.sec, lifespan_4.nanosec, response_qos_2.history,
+                response_qos_2.reliability, response_qos_2.durability, response_qos_2.liveliness,
+                liveliness_lease_duration_4.sec, liveliness_lease_duration_4.nanosec, n10, b10),
+                _t5[p13, n11, n14](n11, b11, hash_6.version, value_5, request_qos_3.depth,
+                deadline_5.sec, deadline_5.nanosec, lifespan_5.sec, lifespan_5.nanosec,
+                request_qos_3.history, request_qos_3.reliability, request_qos_3.durability,
+                request_qos_3.liveliness, liveliness_lease_duration_5.sec,
+                liveliness_lease_duration_5.nanosec, n14, b14, hash_7.version, value_6,
+                response_qos_3.depth, deadline_6.sec, deadline_6.nanosec, lifespan_6.sec,
+                lifespan_6.nanosec, response_qos_3.history, response_qos_3.reliability,
+                response_qos_3.durability, response_qos_3.liveliness,
+                liveliness_lease_duration_6.sec, liveliness_lease_duration_6.nanosec),
+                _t6[n15, n16](n15, b15, n16, b16, hash_8.version, value_7, qos.depth,
+                deadline_7.sec, deadline_7.nanosec, lifespan_7.sec, lifespan_7.nanosec,
+                qos.history, qos.reliability, qos.durability, qos.liveliness,
+                liveliness_lease_duration_7.sec, liveliness_lease_duration_7.nanosec),
+                _t6[n17, n18](n17, b17, n18, b18, hash_9.version, value_8, qos_2.depth,
+                deadline_8.sec, deadline_8.nanosec, lifespan_8.sec, lifespan_8.nanosec,
+                qos_2.history, qos_2.reliability, qos_2.durability, qos_2.liveliness,
+                liveliness_lease_duration_8.sec, liveliness_lease_duration_8.nanosec)))
+        except _FAULTS:
+            return _plain(m, Action)
+
+    @staticmethod
+    def _decode(data: bytes) -> Action:
+        try:
+            h, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 8 + n1
+            name = data[8 : p - 1].decode()
+            p = p + 3 & -4
+            (n2,) = _u5(data, p)
+            q = p + 4
+            p = q + n2
+            name_2 = data[q : p - 1].decode()
+            p = p + 3 & -4
+            (n3,) = _u5(data, p)
+            q = p + 4
+            p = q + n3
+            name_3 = data[q : p - 1].decode()
+            version, value = _u3(data, p)
+            p = p + 36 & -4
+            (depth, sec, nanosec, sec_2, nanosec_2, history, reliability, durability, liveliness,
+                sec_3, nanosec_3, n4) = _u6(data, p)
+            q = p + 36
+            p = q + n4
+            name_4 = data[q : p - 1].decode()
+            version_2, value_2 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_2, sec_4, nanosec_4, sec_5, nanosec_5, history_2, reliability_2, durability_2,
+                liveliness_2, sec_6, nanosec_6, n5) = _u6(data, p)
+            q = p + 36
+            p = q + n5
+            name_5 = data[q : p - 1].decode()
+            p = p + 3 & -4
+            (n6,) = _u5(data, p)
+            q = p + 4
+            p = q + n6
+            name_6 = data[q : p - 1].decode()
+            version_3, value_3 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_3, sec_7, nanosec_7, sec_8, nanosec_8, history_3, reliability_3, durability_3,
+                liveliness_3, sec_9, nanosec_9, n7) = _u6(data, p)
+            q = p + 36
+            p = q + n7
+            name_7 = data[q : p - 1].decode()
+            version_4, value_4 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_4, sec_10, nanosec_10, sec_11, nanosec_11, history_4, reliability_4,
+                durability_4, liveliness_4, sec_12, nanosec_12, n8) = _u6(data, p)
+            q = p + 36
+            p = q + n8
+            name_8 = data[q : p - 1].decode()
+            p = p + 3 & -4
+            (n9,) = _u5(data, p)
+            q = p + 4
+            p = q + n9
+            name_9 = data[q : p - 1].decode()
+            version_5, value_5 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_5, sec_13, nanosec_13, sec_14, nanosec_14, history_5, reliability_5,
+                durability_5, liveliness_5, sec_15, nanosec_15, n10) = _u6(data, p)
+            q = p + 36
+            p = q + n10
+            name_10 = data[q : p - 1].decode()
+            version_6, value_6 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_6, sec_16, nanosec_16, sec_17, nanosec_17, history_6, reliability_6,
+                durability_6, liveliness_6, sec_18, nanosec_18, n11) = _u6(data, p)
+            q = p + 36
+            p = q + n11
+            name_11 = data[q : p - 1].decode()
+            p = p + 3 & -4
+            (n12,) = _u5(data, p)
+            q = p + 4
+            p = q + n12
+            name_12 = data[q : p - 1].decode()
+            version_7, value_7 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_7, sec_19, nanosec_19, sec_20, nanosec_20, history_7, reliability_7,
+                durability_7, liveliness_7, sec_21, nanosec_21, n13) = _u6(data, p)
+            q = p + 36
+            p = q + n13
+            name_13 = data[q : p - 1].decode()
+            p = p + 3 & -4
+            (n14,) = _u5(data, p)
+            q = p + 4
+            p = q + n14
+            name_14 = data[q : p - 1].decode()
+            version_8, value_8 = _u3(data, p)
+            p = p + 36 & -4
+            (depth_8, sec_22, nanosec_22, sec_23, nanosec_23, history_8, reliability_8,
+                durability_8, liveliness_8, sec_24, nanosec_24) = _u7(data, p)
+            return Action(name,
+                Service(name_2, InterfaceType(name_3, TypeHash(version, value)),
+                QoSProfile(depth, Duration(sec, nanosec), Duration(sec_2, nanosec_2), history,
+                reliability, durability, liveliness, Duration(sec_3, nanosec_3)),
+                InterfaceType(name_4, TypeHash(version_2, value_2)),
+                QoSProfile(depth_2, Duration(sec_4, nanosec_4), Duration(sec_5, nanosec_5),
+                history_2, reliability_2, durability_2, liveliness_2, Duration(sec_6, nanosec_6))),
+                Service(name_5, InterfaceType(name_6, TypeHash(version_3, value_3)),
+                QoSProfile(depth_3, Duration(sec_7, nanosec_7), Duration(sec_8, nanosec_8),
+                history_3, reliability_3, durability_3, liveliness_3, Duration(sec_9, nanosec_9)),
+                InterfaceType(name_7, TypeHash(version_4, value_4)),
+                QoSProfile(depth_4, Duration(sec_10, nanosec_10), Duration(sec_11, nanosec_11),
+                history_4, reliability_4, durability_4, liveliness_4,
+                Duration(sec_12, nanosec_12))),
+                Service(name_8, InterfaceType(name_9, TypeHash(version_5, value_5)),
+                QoSProfile(depth_5, Duration(sec_13, nanosec_13), Duration(sec_14, nanosec_14),
+                history_5, reliability_5, durability_5, liveliness_5,
+                Duration(sec_15, nanosec_15)),
+                InterfaceType(name_10, TypeHash(version_6, value_6)),
+                QoSProfile(depth_6, Duration(sec_16, nanosec_16), Duration(sec_17, nanosec_17),
+                history_6, reliability_6, durability_6, liveliness_6,
+                Duration(sec_18, nanosec_18))),
+                Topic(name_11, InterfaceType(name_12, TypeHash(version_7, value_7)),
+                QoSProfile(depth_7, Duration(sec_19, nanosec_19), Duration(sec_20, nanosec_20),
+                history_7, reliability_7, durability_7, liveliness_7,
+                Duration(sec_21, nanosec_21))),
+                Topic(name_13, InterfaceType(name_14, TypeHash(version_8, value_8)),
+                QoSProfile(depth_8, Duration(sec_22, nanosec_22), Duration(sec_23, nanosec_23),
+                history_8, reliability_8, durability_8, liveliness_8,
+                Duration(sec_24, nanosec_24))))
+        except _FAULTS:
+            return _explain(data, Action)
+
+
+_p3 = _Struct("<IiI").pack
+_u8 = _Struct("<IiI").unpack_from
 
 
 class Clock(_Message):
@@ -48,26 +715,1994 @@ class Clock(_Message):
     def _encode(m: _Any) -> bytes:
         try:
             clock = m.clock
-            return _p1(256, clock.sec, clock.nanosec)
+            return _p3(256, clock.sec, clock.nanosec)
         except _FAULTS:
             return _plain(m, Clock)
 
     @staticmethod
     def _decode(data: bytes) -> Clock:
         try:
-            h, sec, nanosec = _u1(data)
+            h, sec, nanosec = _u8(data)
             if h != 256: raise ValueError
             return Clock(Time(sec, nanosec))
         except _FAULTS:
             return _explain(data, Clock)
 
 
-_t1 = _Stride("I i I I $ B I $", -4, 4)
-_t2 = _Stride("I $", None, 4)
+_t8 = _Stride("I I $ I", -4, 8)
+_t9 = _Stride("I $ B I $", None, 8)
+_t10 = _Stride("I $ ? ? I", None, 8)
+_p4 = _Struct("<3d").pack
+_p5 = _Struct("<I").pack
+_p6 = _Struct("<2qQ").pack
+_t11 = _Stride("B ? q d I $ I", None, 8)
+_t12 = _Stride("I", None, 8)
 _s1 = _StringList()
-_t3 = _Template("I $ I $ I", None)
-_u2 = _Struct("<Ii2I").unpack_from
-_u3 = _Struct("<I").unpack_from
+_t13 = _Stride("I $ I $ B 32s I i I i I B B B B i I", None, 8)
+_t14 = _Stride("I $ B 32s I i I i I B B B B i I", None, 8)
+_t15 = _Stride("I $ I $", None, 8)
+_t16 = _Stride("I $ B 32s I i I i I B B B B i I I $ B 32s I i I i I B B B B i I", None, 8)
+_t17 = _Stride("I $ B 32s I i I i I B B B B i I I $", None, 8)
+_u9 = _Struct("<2?").unpack_from
+_i1 = _Struct("<3d").iter_unpack
+_i2 = _Struct("<2qQ").iter_unpack
+_u10 = _Struct("<B?").unpack_from
+_u11 = _Struct("<qdI").unpack_from
+
+
+class Node(_Message):
+    """A node with all that others can see of it."""
+
+    name: str = ""
+    parameters: list[ParameterDescriptor] = []
+    parameter_values: list[ParameterValue] = []
+    publishers: list[Topic] = []
+    subscriptions: list[Topic] = []
+    service_clients: list[Service] = []
+    service_servers: list[Service] = []
+    action_clients: list[Action] = []
+    action_servers: list[Action] = []
+    _type = "rosgraph_msgs/Node"
+    _type_name = "rosgraph_msgs/msg/Node"
+    _type_hash = "RIHS01_2260c5128039783515bd98bc77bbb49ae4758818d9e3c6536b313c2024c77045"
+    _md5sum = "0aaf6760f74629a28eb24c975fe91201"
+    _text = (
+        "# A node with all that others can see of it.\n"
+        "\n"
+        "string name                                            # with the namespace\n"
+        "rcl_interfaces/ParameterDescriptor[] parameters\n"
+        "rcl_interfaces/ParameterValue[] parameter_values       # in the same order\n"
+        "Topic[] publishers\n"
+        "Topic[] subscriptions\n"
+        "Service[] service_clients\n"
+        "Service[] service_servers\n"
+        "Action[] action_clients\n"
+        "Action[] action_servers\n"
+    )
+    _schema = (("name", "string", ""), ("parameters", ParameterDescriptor, "[]"),
+        ("parameter_values", ParameterValue, "[]"), ("publishers", Topic, "[]"),
+        ("subscriptions", Topic, "[]"), ("service_clients", Service, "[]"),
+        ("service_servers", Service, "[]"), ("action_clients", Action, "[]"),
+        ("action_servers", Action, "[]"))
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            n1, b1 = _texts[m.name]
+            parameters = m.parameters
+            n2 = len(parameters)
+            f3, p4 = _t8[n1]
+            out = [f3(256, n1, b1, n2)]
+            p5 = p4
+            for parameters_one in parameters:
+                n6, b6 = _texts[parameters_one.name]
+                b7 = parameters_one.description.encode()
+                if 0 in b7: raise ValueError
+                n7 = len(b7) + 1
+                b8 = parameters_one.additional_constraints.encode()
+                if 0 in b8: raise ValueError
+                n8 = len(b8) + 1
+                f9, p10 = _t9[p5, n6, n7]
+                floating_point_range = parameters_one.floating_point_range
+                n11 = len(floating_point_range)
+                if n11 > 1: raise ValueError
+                f12, p13 = _t10[p10, n8]
+                p14 = 0 if n11 else p13
+                integer_range = parameters_one.integer_range
+                n15 = len(integer_range)
+                if n15 > 1: raise ValueError
+                p16 = 0 if n15 else p14 + n11 * 24 + 4
+                out += (f9(n6, b6, parameters_one.type, n7, b7),
+                    f12(n8, b8, _TRUTH[parameters_one.read_only],
+                    _TRUTH[parameters_one.dynamic_typing], n11),
+                    (_PADDING[-(p13) & 7] if n11 else b""),
+                    b"".join([_p4(e.from_value, e.to_value,
+                    e.step) for e in floating_point_range]), _p5(n15),
+                    (_PADDING[-(p14 + n11 * 24 + 4) & 7] if n15 else b""),
+                    b"".join([_p6(e.from_value, e.to_value, e.step) for e in integer_range]))
+                p5 = p16 + n15 * 24 & 7
+            parameter_values = m.parameter_values
+            n17 = len(parameter_values)
+            out.append(_p5(n17))
+            p18 = p5 + 4 & 7
+            for parameter_values_one in parameter_values:
+                b19 = parameter_values_one.string_value.encode()
+                if 0 in b19: raise ValueError
+                n19 = len(b19) + 1
+                byte_array_value = parameter_values_one.byte_array_value
+                if type(byte_array_value) is not bytes:
+                    byte_array_value = _octets(byte_array_value)
+                n20 = len(byte_array_value)
+                f21, p22 = _t11[p18, n19]
+                bool_array_value = parameter_values_one.bool_array_value
+                bool_array_value = _flags(bool_array_value)
+                n23 = len(bool_array_value)
+                f24, p25 = _t12[p22 + n20 & 7]
+                integer_array_value = parameter_values_one.integer_array_value
+                if type(integer_array_value) is not _array or integer_array_value.typecode != "q":
+                    n26, integer_array_value = _numbers(integer_array_value, "q")
+                else:
+                    n26 = len(integer_array_value)
+                f27, p28 = _t12[p25 + n23 & 7]
+                p29 = 0 if n26 else p28
+                double_array_value = parameter_values_one.double_array_value
+                if type(double_array_value) is not _array or double_array_value.typecode != "d":
+                    n30, double_array_value = _numbers(double_array_value, "d")
+                else:
+                    n30 = len(double_array_value)
+                p31 = 0 if n30 else p29 + n26 * 8 + 4
+                string_array_value, k = parameter_values_one.string_array_value, _s1.written
+                b32 = k[1] if string_array_value == k[0] else _s1.put(string_array_value)
+                n32 = len(b32)
+                out += (f21(parameter_values_one.type, _TRUTH[parameter_values_one.bool_value],
+                    parameter_values_one.integer_value, parameter_values_one.double_value, n19,
+                    b19, n20), byte_array_value, f24(n23), bool_array_value, f27(n26),
+                    (_PADDING[-(p28) & 7] if n26 else b""), integer_array_value, _p5(n30),
+                    (_PADDING[-(p29 + n26 * 8 + 4) & 7] if n30 else b""), double_array_value, b32)
+                p18 = p31 + n30 * 8 + n32 & 7
+            publishers = m.publishers
+            n33 = len(publishers)
+            f34, p35 = _t12[p18]
+            out.append(f34(n33))
+            p36 = p35
+            for publishers_one in publishers:
+                n37, b37 = _texts[publishers_one.name]
+                type_2 = publishers_one.type
+                n38, b38 = _texts[type_2.name]
+                hash_2 = type_2.hash
+                value = hash_2.value
+                if type(value) is not bytes or len(value) != 32:
+                    value = bytes(_octets(value, 32))
+                qos = publishers_one.qos
+                deadline = qos.deadline
+                lifespan = qos.lifespan
+                liveliness_lease_duration = qos.liveliness_lease_duration
+                f39, p40 = _t13[p36, n37, n38]
+                out.append(f39(n37, b37, n38, b38, hash_2.version, value, qos.depth, deadline.sec,
+                    deadline.nanosec, lifespan.sec, lifespan.nanosec, qos.history, qos.reliability,
+                    qos.durability, qos.liveliness, liveliness_lease_duration.sec,
+                    liveliness_lease_duration.nanosec))
+                p36 = p40
+            subscriptions = m.subscriptions
+            n41 = len(subscriptions)
+            out.append(_p5(n41))
+            p42 = p36 + 4 & 7
+            for subscriptions_one in subscriptions:
+                n43, b43 = _texts[subscriptions_one.name]
+                type_3 = subscriptions_one.type
+                n44, b44 = _texts[type_3.name]
+                hash_3 = type_3.hash
+                value_2 = hash_3.value
+                if type(value_2) is not bytes or len(value_2) != 32:
+                    value_2 = bytes(_octets(value_2, 32))
+                qos_2 = subscriptions_one.qos
+                deadline_2 = qos_2.deadline
+                lifespan_2 = qos_2.lifespan
+                liveliness_lease_duration_2 = qos_2.liveliness_lease_duration
+                f45, p46 = _t13[p42, n43, n44]
+                out.append(f45(n43, b43, n44, b44, hash_3.version, value_2, qos_2.depth,
+                    deadline_2.sec, deadline_2.nanosec, lifespan_2.sec, lifespan_2.nanosec,
+                    qos_2.history, qos_2.reliability, qos_2.durability, qos_2.liveliness,
+                    liveliness_lease_duration_2.sec, liveliness_lease_duration_2.nanosec))
+                p42 = p46
+            service_clients = m.service_clients
+            n47 = len(service_clients)
+            out.append(_p5(n47))
+            p48 = p42 + 4 & 7
+            for service_clients_one in service_clients:
+                n49, b49 = _texts[service_clients_one.name]
+                request_type = service_clients_one.request_type
+                n50, b50 = _texts[request_type.name]
+                hash_4 = request_type.hash
+                value_3 = hash_4.value
+                if type(value_3) is not bytes or len(value_3) != 32:
+                    value_3 = bytes(_octets(value_3, 32))
+                request_qos = service_clients_one.request_qos
+                deadline_3 = request_qos.deadline
+                lifespan_3 = request_qos.lifespan
+                liveliness_lease_duration_3 = request_qos.liveliness_lease_duration
+                response_type = service_clients_one.response_type
+                n51, b51 = _texts[response_type.name]
+                f52, p53 = _t13[p48, n49, n50]
+                hash_5 = response_type.hash
+                value_4 = hash_5.value
+                if type(value_4) is not bytes or len(value_4) != 32:
+                    value_4 = bytes(_octets(value_4, 32))
+                response_qos = service_clients_one.response_qos
+                deadline_4 = response_qos.deadline
+                lifespan_4 = response_qos.lifespan
+                liveliness_lease_duration_4 = response_qos.liveliness_lease_duration
+                f54, p55 = _t14[p53, n51]
+                out += (f52(n49, b49, n50, b50, hash_4.version, value_3, request_qos.depth,
+                    deadline_3.sec, deadline_3.nanosec, lifespan_3.sec, lifespan_3.nanosec,
+                    request_qos.history, request_qos.reliability, request_qos.durability,
+                    request_qos.liveliness, liveliness_lease_duration_3.sec,
+                    liveliness_lease_duration_3.nanosec),
+                    f54(n51, b51, hash_5.version, value_4, response_qos.depth, deadline_4.sec,
+                    deadline_4.nanosec, lifespan_4.sec, lifespan_4.nanosec, response_qos.history,
+                    response_qos.reliability, response_qos.durability, response_qos.liveliness,
+                    liveliness_lease_duration_4.sec, liveliness_lease_duration_4.nanosec))
+                p48 = p55
+            service_servers = m.service_servers
+            n56 = len(service_servers)
+            out.append(_p5(n56))
+            p57 = p48 + 4 & 7
+            for service_servers_one in service_servers:
+                n58, b58 = _texts[service_servers_one.name]
+                request_type_2 = service_servers_one.request_type
+                n59, b59 = _texts[request_type_2.name]
+                hash_6 = request_type_2.hash
+                value_5 = hash_6.value
+                if type(value_5) is not bytes or len(value_5) != 32:
+                    value_5 = bytes(_octets(value_5, 32))
+                request_qos_2 = service_servers_one.request_qos
+                deadline_5 = request_qos_2.deadline
+                lifespan_5 = request_qos_2.lifespan
+                liveliness_lease_duration_5 = request_qos_2.liveliness_lease_duration
+                response_type_2 = service_servers_one.response_type
+                n60, b60 = _texts[response_type_2.name]
+                f61, p62 = _t13[p57, n58, n59]
+                hash_7 = response_type_2.hash
+                value_6 = hash_7.value
+                if type(value_6) is not bytes or len(value_6) != 32:
+                    value_6 = bytes(_octets(value_6, 32))
+                response_qos_2 = service_servers_one.response_qos
+                deadline_6 = response_qos_2.deadline
+                lifespan_6 = response_qos_2.lifespan
+                liveliness_lease_duration_6 = response_qos_2.liveliness_lease_duration
+                f63, p64 = _t14[p62, n60]
+                out += (f61(n58, b58, n59, b59, hash_6.version, value_5, request_qos_2.depth,
+                    deadline_5.sec, deadline_5.nanosec, lifespan_5.sec, lifespan_5.nanosec,
+                    request_qos_2.history, request_qos_2.reliability, request_qos_2.durability,
+                    request_qos_2.liveliness, liveliness_lease_duration_5.sec,
+                    liveliness_lease_duration_5.nanosec),
+                    f63(n60, b60, hash_7.version, value_6, response_qos_2.depth, deadline_6.sec,
+                    deadline_6.nanosec, lifespan_6.sec, lifespan_6.nanosec, response_qos_2.history,
+                    response_qos_2.reliability, response_qos_2.durability,
+                    response_qos_2.liveliness, liveliness_lease_duration_6.sec,
+                    liveliness_lease_duration_6.nanosec))
+                p57 = p64
+            action_clients = m.action_clients
+            n65 = len(action_clients)
+            out.append(_p5(n65))
+            p66 = p57 + 4 & 7
+            for action_clients_one in action_clients:
+                n67, b67 = _texts[action_clients_one.name]
+                send_goal = action_clients_one.send_goal
+                n68, b68 = _texts[send_goal.name]
+                request_type_3 = send_goal.request_type
+                n69, b69 = _texts[request_type_3.name]
+                f70, p71 = _t15[p66, n67, n68]
+                hash_8 = request_type_3.hash
+                value_7 = hash_8.value
+                if type(value_7) is not bytes or len(value_7) != 32:
+                    value_7 = bytes(_octets(value_7, 32))
+                request_qos_3 = send_goal.request_qos
+                deadline_7 = request_qos_3.deadline
+                lifespan_7 = request_qos_3.lifespan
+                liveliness_lease_duration_7 = request_qos_3.liveliness_lease_duration
+                response_type_3 = send_goal.response_type
+                n72, b72 = _texts[response_type_3.name]
+                hash_9 = response_type_3.hash
+                value_8 = hash_9.value
+                if type(value_8) is not bytes or len(value_8) != 32:
+                    value_8 = bytes(_octets(value_8, 32))
+                response_qos_3 = send_goal.response_qos
+                deadline_8 = response_qos_3.deadline
+                lifespan_8 = response_qos_3.lifespan
+                liveliness_lease_duration_8 = response_qos_3.liveliness_lease_duration
+                get_result = action_clients_one.get_result
+                n73, b73 = _texts[get_result.name]
+                f74, p75 = _t16[p71, n69, n72]
+                request_type_4 = get_result.request_type
+                n76, b76 = _texts[request_type_4.name]
+                hash_10 = request_type_4.hash
+                value_9 = hash_10.value
+                if type(value_9) is not bytes or len(value_9) != 32:
+                    value_9 = bytes(_octets(value_9, 32))
+                request_qos_4 = get_result.request_qos
+                deadline_9 = request_qos_4.deadline
+                lifespan_9 = request_qos_4.lifespan
+                liveliness_lease_duration_9 = request_qos_4.liveliness_lease_duration
+                response_type_4 = get_result.response_type
+                n77, b77 = _texts[response_type_4.name]
+                f78, p79 = _t13[p75, n73, n76]
+                hash_11 = response_type_4.hash
+                value_10 = hash_11.value
+                if type(value_10) is not bytes or len(value_10) != 32:
+                    value_10 = bytes(_octets(value_10, 32))
+                response_qos_4 = get_result.response_qos
+                deadline_10 = response_qos_4.deadline
+                lifespan_10 = response_qos_4.lifespan
+                liveliness_lease_duration_10 = response_qos_4.liveliness_lease_duration
+                cancel_goal = action_clients_one.cancel_goal
+                n80, b80 = _texts[cancel_goal.name]
+                request_type_5 = cancel_goal.request_type
+                n81, b81 = _texts[request_type_5.name]
+                f82, p83 = _t17[p79, n77, n80]
+                hash_12 = request_type_5.hash
+                value_11 = hash_12.value
+                if type(value_11) is not bytes or len(value_11) != 32:
+                    value_11 = bytes(_octets(value_11, 32))
+                request_qos_5 = cancel_goal.request_qos
+                deadline_11 = request_qos_5.deadline
+                lifespan_11 = request_qos_5.lifespan
+                liveliness_lease_duration_11 = request_qos_5.liveliness_lease_duration
+                response_type_5 = cancel_goal.response_type
+                n84, b84 = _texts[response_type_5.name]
+                hash_13 = response_type_5.hash
+                value_12 = hash_13.value
+                if type(value_12) is not bytes or len(value_12) != 32:
+                    value_12 = bytes(_octets(value_12, 32))
+                response_qos_5 = cancel_goal.response_qos
+                deadline_12 = response_qos_5.deadline
+                lifespan_12 = response_qos_5.lifespan
+                liveliness_lease_duration_12 = response_qos_5.liveliness_lease_duration
+                feedback = action_clients_one.feedback
+                n85, b85 = _texts[feedback.name]
+                f86, p87 = _t16[p83, n81, n84]
+                type_4 = feedback.type
+                n88, b88 = _texts[type_4.name]
+                hash_14 = type_4.hash
+                value_13 = hash_14.value
+                if type(value_13) is not bytes or len(value_13) != 32:
+                    value_13 = bytes(_octets(value_13, 32))
+                qos_3 = feedback.qos
+                deadline_13 = qos_3.deadline
+                lifespan_13 = qos_3.lifespan
+                liveliness_lease_duration_13 = qos_3.liveliness_lease_duration
+                status = action_clients_one.status
+                n89, b89 = _texts[status.name]
+                f90, p91 = _t13[p87, n85, n88]
+                type_5 = status.type
+                n92, b92 = _texts[type_5.name]
+                hash_15 = type_5.hash
+                value_14 = hash_15.value
+                if type(value_14) is not bytes or len(value_14) != 32:
+                    value_14 = bytes(_octets(value_14, 32))
+                qos_4 = status.qos
+                deadline_14 = qos_4.deadline
+                lifespan_14 = qos_4.lifespan
+                liveliness_lease_duration_14 = qos_4.liveliness_lease_duration
+                f93, p94 = _t13[p91, n89, n92]
+                out += (f70(n67, b67, n68, b68),
+                    f74(n69, b69, hash_8.version, value_7, request_qos_3.depth, deadline_7.sec,
+                    deadline_7.nanosec, lifespan_7.sec, lifespan_7.nanosec, request_qos_3.history,
+                    request_qos_3.reliability, request_qos_3.durability, request_qos_3.liveliness,
+                    liveliness_lease_duration_7.sec, liveliness_lease_duration_7.nanosec, n72, b72,
+                    hash_9.version, value_8, response_qos_3.depth, deadline_8.sec,
+                    deadline_8.nanosec, lifespan_8.sec, lifespan_8.nanosec, response_qos_3.history,
+                    response_qos_3.reliability, response_qos_3.durability,
+                    response_qos_3.liveliness, liveliness_lease_duration_8.sec,
+                    liveliness_lease_duration_8.nanosec),
+                    f78(n73, b73, n76, b76, hash_10.version, value_9, request_qos_4.depth,
+                    deadline_9.sec, deadline_9.nanosec, lifespan_9.sec, lifespan_9.nanosec,
+                    request_qos_4.history, request_qos_4.reliability, request_qos_4.durability,
+                    request_qos_4.liveliness, liveliness_lease_duration_9.sec,
+                    liveliness_lease_duration_9.nanosec),
+                    f82(n77, b77, hash_11.version, value_10, response_qos_4.depth, deadline_10.sec,
+                    deadline_10.nanosec, lifespan_10.sec, lifespan_10.nanosec,
+                    response_qos_4.history, response_qos_4.reliability, response_qos_4.durability,
+                    response_qos_4.liveliness, liveliness_lease_duration_10.sec,
+                    liveliness_lease_duration_10.nanosec, n80, b80),
+                    f86(n81, b81, hash_12.version, value_11, request_qos_5.depth, deadline_11.sec,
+                    deadline_11.nanosec, lifespan_11.sec, lifespan_11.nanosec,
+                    request_qos_5.history, request_qos_5.reliability, request_qos_5.durability,
+                    request_qos_5.liveliness, liveliness_lease_duration_11.sec,
+                    liveliness_lease_duration_11.nanosec, n84, b84, hash_13.version, value_12,
+                    response_qos_5.depth, deadline_12.sec, deadline_12.nanosec, lifespan_12.sec,
+                    lifespan_12.nanosec, response_qos_5.history, response_qos_5.reliability,
+                    response_qos_5.durability, response_qos_5.liveliness,
+                    liveliness_lease_duration_12.sec, liveliness_lease_duration_12.nanosec),
+                    f90(n85, b85, n88, b88, hash_14.version, value_13, qos_3.depth,
+                    deadline_13.sec, deadline_13.nanosec, lifespan_13.sec, lifespan_13.nanosec,
+                    qos_3.history, qos_3.reliability, qos_3.durability, qos_3.liveliness,
+                    liveliness_lease_duration_13.sec, liveliness_lease_duration_13.nanosec),
+                    f93(n89, b89, n92, b92, hash_15.version, value_14, qos_4.depth,
+                    deadline_14.sec, deadline_14.nanosec, lifespan_14.sec, lifespan_14.nanosec,
+                    qos_4.history, qos_4.reliability, qos_4.durability, qos_4.liveliness,
+                    liveliness_lease_duration_14.sec, liveliness_lease_duration_14.nanosec))
+                p66 = p94
+            action_servers = m.action_servers
+            n95 = len(action_servers)
+            out.append(_p5(n95))
+            p96 = p66 + 4 & 7
+            for action_servers_one in action_servers:
+                n97, b97 = _texts[action_servers_one.name]
+                send_goal_2 = action_servers_one.send_goal
+                n98, b98 = _texts[send_goal_2.name]
+                request_type_6 = send_goal_2.request_type
+                n99, b99 = _texts[request_type_6.name]
+                f100, p101 = _t15[p96, n97, n98]
+                hash_16 = request_type_6.hash
+                value_15 = hash_16.value
+                if type(value_15) is not bytes or len(value_15) != 32:
+                    value_15 = bytes(_octets(value_15, 32))
+                request_qos_6 = send_goal_2.request_qos
+                deadline_15 = request_qos_6.deadline
+                lifespan_15 = request_qos_6.lifespan
+                liveliness_lease_duration_15 = request_qos_6.liveliness_lease_duration
+                response_type_6 = send_goal_2.response_type
+                n102, b102 = _texts[response_type_6.name]
+                hash_17 = response_type_6.hash
+                value_16 = hash_17.value
+                if type(value_16) is not bytes or len(value_16) != 32:
+                    value_16 = bytes(_octets(value_16, 32))
+                response_qos_6 = send_goal_2.response_qos
+                deadline_16 = response_qos_6.deadline
+                lifespan_16 = response_qos_6.lifespan
+                liveliness_lease_duration_16 = response_qos_6.liveliness_lease_duration
+                get_result_2 = action_servers_one.get_result
+                n103, b103 = _texts[get_result_2.name]
+                f104, p105 = _t16[p101, n99, n102]
+                request_type_7 = get_result_2.request_type
+                n106, b106 = _texts[request_type_7.name]
+                hash_18 = request_type_7.hash
+                value_17 = hash_18.value
+                if type(value_17) is not bytes or len(value_17) != 32:
+                    value_17 = bytes(_octets(value_17, 32))
+                request_qos_7 = get_result_2.request_qos
+                deadline_17 = request_qos_7.deadline
+                lifespan_17 = request_qos_7.lifespan
+                liveliness_lease_duration_17 = request_qos_7.liveliness_lease_duration
+                response_type_7 = get_result_2.response_type
+                n107, b107 = _texts[response_type_7.name]
+                f108, p109 = _t13[p105, n103, n106]
+                hash_19 = response_type_7.hash
+                value_18 = hash_19.value
+                if type(value_18) is not bytes or len(value_18) != 32:
+                    value_18 = bytes(_octets(value_18, 32))
+                response_qos_7 = get_result_2.response_qos
+                deadline_18 = response_qos_7.deadline
+                lifespan_18 = response_qos_7.lifespan
+                liveliness_lease_duration_18 = response_qos_7.liveliness_lease_duration
+                cancel_goal_2 = action_servers_one.cancel_goal
+                n110, b110 = _texts[cancel_goal_2.name]
+                request_type_8 = cancel_goal_2.request_type
+                n111, b111 = _texts[request_type_8.name]
+                f112, p113 = _t17[p109, n107, n110]
+                hash_20 = request_type_8.hash
+                value_19 = hash_20.value
+                if type(value_19) is not bytes or len(value_19) != 32:
+                    value_19 = bytes(_octets(value_19, 32))
+                request_qos_8 = cancel_goal_2.request_qos
+                deadline_19 = request_qos_8.deadline
+                lifespan_19 = request_qos_8.lifespan
+                liveliness_lease_duration_19 = request_qos_8.liveliness_lease_duration
+                response_type_8 = cancel_goal_2.response_type
+                n114, b114 = _texts[response_type_8.name]
+                hash_21 = response_type_8.hash
+                value_20 = hash_21.value
+                if type(value_20) is not bytes or len(value_20) != 32:
+                    value_20 = bytes(_octets(value_20, 32))
+                response_qos_8 = cancel_goal_2.response_qos
+                deadline_20 = response_qos_8.deadline
+                lifespan_20 = response_qos_8.lifespan
+                liveliness_lease_duration_20 = response_qos_8.liveliness_lease_duration
+                feedback_2 = action_servers_one.feedback
+                n115, b115 = _texts[feedback_2.name]
+                f116, p117 = _t16[p113, n111, n114]
+                type_6 = feedback_2.type
+                n118, b118 = _texts[type_6.name]
+                hash_22 = type_6.hash
+                value_21 = hash_22.value
+                if type(value_21) is not bytes or len(value_21) != 32:
+                    value_21 = bytes(_octets(value_21, 32))
+                qos_5 = feedback_2.qos
+                deadline_21 = qos_5.deadline
+                lifespan_21 = qos_5.lifespan
+                liveliness_lease_duration_21 = qos_5.liveliness_lease_duration
+                status_2 = action_servers_one.status
+                n119, b119 = _texts[status_2.name]
+                f120, p121 = _t13[p117, n115, n118]
+                type_7 = status_2.type
+                n122, b122 = _texts[type_7.name]
+                hash_23 = type_7.hash
+                value_22 = hash_23.value
+                if type(value_22) is not bytes or len(value_22) != 32:
+                    value_22 = bytes(_octets(value_22, 32))
+                qos_6 = status_2.qos
+                deadline_22 = qos_6.deadline
+                lifespan_22 = qos_6.lifespan
+                liveliness_lease_duration_22 = qos_6.liveliness_lease_duration
+                f123, p124 = _t13[p121, n119, n122]
+                out += (f100(n97, b97, n98, b98),
+                    f104(n99, b99, hash_16.version, value_15, request_qos_6.depth, deadline_15.sec,
+                    deadline_15.nanosec, lifespan_15.sec, lifespan_15.nanosec,
+                    request_qos_6.history, request_qos_6.reliability, request_qos_6.durability,
+                    request_qos_6.liveliness, liveliness_lease_duration_15.sec,
+                    liveliness_lease_duration_15.nanosec, n102, b102, hash_17.version, value_16,
+                    response_qos_6.depth, deadline_16.sec, deadline_16.nanosec, lifespan_16.sec,
+                    lifespan_16.nanosec, response_qos_6.history, response_qos_6.reliability,
+                    response_qos_6.durability, response_qos_6.liveliness,
+                    liveliness_lease_duration_16.sec, liveliness_lease_duration_16.nanosec),
+                    f108(n103, b103, n106, b106, hash_18.version, value_17, request_qos_7.depth,
+                    deadline_17.sec, deadline_17.nanosec, lifespan_17.sec, lifespan_17.nanosec,
+                    request_qos_7.history, request_qos_7.reliability, request_qos_7.durability,
+                    request_qos_7.liveliness, liveliness_lease_duration_17.sec,
+                    liveliness_lease_duration_17.nanosec),
+                    f112(n107, b107, hash_19.version, value_18, response_qos_7.depth,
+                    deadline_18.sec, deadline_18.nanosec, lifespan_18.sec, lifespan_18.nanosec,
+                    response_qos_7.history, response_qos_7.reliability, response_qos_7.durability,
+                    response_qos_7.liveliness, liveliness_lease_duration_18.sec,
+                    liveliness_lease_duration_18.nanosec, n110, b110),
+                    f116(n111, b111, hash_20.version, value_19, request_qos_8.depth,
+                    deadline_19.sec, deadline_19.nanosec, lifespan_19.sec, lifespan_19.nanosec,
+                    request_qos_8.history, request_qos_8.reliability, request_qos_8.durability,
+                    request_qos_8.liveliness, liveliness_lease_duration_19.sec,
+                    liveliness_lease_duration_19.nanosec, n114, b114, hash_21.version, value_20,
+                    response_qos_8.depth, deadline_20.sec, deadline_20.nanosec, lifespan_20.sec,
+                    lifespan_20.nanosec, response_qos_8.history, response_qos_8.reliability,
+                    response_qos_8.durability, response_qos_8.liveliness,
+                    liveliness_lease_duration_20.sec, liveliness_lease_duration_20.nanosec),
+                    f120(n115, b115, n118, b118, hash_22.version, value_21, qos_5.depth,
+                    deadline_21.sec, deadline_21.nanosec, lifespan_21.sec, lifespan_21.nanosec,
+                    qos_5.history, qos_5.reliability, qos_5.durability, qos_5.liveliness,
+                    liveliness_lease_duration_21.sec, liveliness_lease_duration_21.nanosec),
+                    f123(n119, b119, n122, b122, hash_23.version, value_22, qos_6.depth,
+                    deadline_22.sec, deadline_22.nanosec, lifespan_22.sec, lifespan_22.nanosec,
+                    qos_6.history, qos_6.reliability, qos_6.durability, qos_6.liveliness,
+                    liveliness_lease_duration_22.sec, liveliness_lease_duration_22.nanosec))
+                p96 = p124
+            return b"".join(out)
+        except _FAULTS:
+            return _plain(m, Node)
+
+    @staticmethod
+    def _decode(data: bytes) -> Node:
+        try:
+            h, n1 = _u2(data)
+            if h != 256: raise ValueError
+            p = 8 + n1
+            name = data[8 : p - 1].decode()
+            p = p + 3 & -4
+            (n2,) = _u5(data, p)
+            parameters = []
+            p = p + 4
+            for _ in range(n2):
+                (n3,) = _u5(data, p)
+                q = p + 4
+                p = q + n3
+                name_2 = data[q : p - 1].decode()
+                type_2 = data[p]
+                p = p + 4 & -4
+                (n4,) = _u5(data, p)
+                q = p + 4
+                p = q + n4
+                description = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n5,) = _u5(data, p)
+                q = p + 4
+                p = q + n5
+                additional_constraints = data[q : p - 1].decode()
+                read_only, dynamic_typing = _u9(data, p)
+                p = p + 5 & -4
+                (n6,) = _u5(data, p)
+                if n6 > 1: raise ValueError
+                q = (p + 7 | 7) - 3 if n6 else p + 4
+                p = q + n6 * 24
+                floating_point_range = list(_starmap(FloatingPointRange, _i1(data[q : p])))
+                (n7,) = _u5(data, p)
+                if n7 > 1: raise ValueError
+                q = (p + 7 | 7) - 3 if n7 else p + 4
+                p = q + n7 * 24
+                integer_range = list(_starmap(IntegerRange, _i2(data[q : p])))
+                parameters.append(ParameterDescriptor(name_2, type_2, description,
+                    additional_constraints, read_only, dynamic_typing, floating_point_range,
+                    integer_range))
+            (n8,) = _u5(data, p)
+            parameter_values = []
+            p = p + 4
+            for _ in range(n8):
+                type_3, bool_value = _u10(data, p)
+                p = (p + 5 | 7) - 3
+                integer_value, double_value, n9 = _u11(data, p)
+                q = p + 20
+                p = q + n9
+                string_value = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n10,) = _u5(data, p)
+                q = p + 4
+                p = q + n10
+                byte_array_value = data[q : p]
+                p = p + 3 & -4
+                (n11,) = _u5(data, p)
+                q = p + 4
+                p = q + n11
+                bool_array_value = _read_flags(data[q : p])
+                p = p + 3 & -4
+                (n12,) = _u5(data, p)
+                q = (p + 7 | 7) - 3 if n12 else p + 4
+                p = q + n12 * 8
+                integer_array_value = _array("q", data[q : p]) if n12 < 8192 else _read_block("q",
+                    data, q, p)
+                (n13,) = _u5(data, p)
+                q = (p + 7 | 7) - 3 if n13 else p + 4
+                p = q + n13 * 8
+                double_array_value = _array("d", data[q : p]) if n13 < 8192 else _read_block("d",
+                    data, q, p)
+                k, string_array_value = _s1.read
+                if data.startswith(k, p):
+                    p = p + len(k)
+                    string_array_value = string_array_value[:]
+                else:
+                    string_array_value, p = _s1.take(data, p)
+                parameter_values.append(ParameterValue(type_3, bool_value, integer_value,
+                    double_value, string_value, byte_array_value, bool_array_value,
+                    integer_array_value, double_array_value, string_array_value))
+            p = p + 3 & -4
+            (n14,) = _u5(data, p)
+            publishers = []
+            p = p + 4
+            for _ in range(n14):
+                (n15,) = _u5(data, p)
+                q = p + 4
+                p = q + n15
+                name_3 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n16,) = _u5(data, p)
+                q = p + 4
+                p = q + n16
+                name_4 = data[q : p - 1].decode()
+                version, value = _u3(data, p)
+                p = p + 36 & -4
+                (depth, sec, nanosec, sec_2, nanosec_2, history, reliability, durability,
+                    liveliness, sec_3, nanosec_3) = _u7(data, p)
+                p += 32
+                publishers.append(Topic(name_3, InterfaceType(name_4, TypeHash(version, value)),
+                    QoSProfile(depth, Duration(sec, nanosec), Duration(sec_2, nanosec_2), history,
+                    reliability, durability, liveliness, Duration(sec_3, nanosec_3))))
+            (n17,) = _u5(data, p)
+            subscriptions = []
+            p = p + 4
+            for _ in range(n17):
+                (n18,) = _u5(data, p)
+                q = p + 4
+                p = q + n18
+                name_5 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n19,) = _u5(data, p)
+                q = p + 4
+                p = q + n19
+                name_6 = data[q : p - 1].decode()
+                version_2, value_2 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_2, sec_4, nanosec_4, sec_5, nanosec_5, history_2, reliability_2,
+                    durability_2, liveliness_2, sec_6, nanosec_6) = _u7(data, p)
+                p += 32
+                subscriptions.append(Topic(name_5,
+                    InterfaceType(name_6, TypeHash(version_2, value_2)),
+                    QoSProfile(depth_2, Duration(sec_4, nanosec_4), Duration(sec_5, nanosec_5),
+                    history_2, reliability_2, durability_2, liveliness_2,
+                    Duration(sec_6, nanosec_6))))
+            (n20,) = _u5(data, p)
+            service_clients = []
+            p = p + 4
+            for _ in range(n20):
+                (n21,) = _u5(data, p)
+                q = p + 4
+                p = q + n21
+                name_7 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n22,) = _u5(data, p)
+                q = p + 4
+                p = q + n22
+                name_8 = data[q : p - 1].decode()
+                version_3, value_3 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_3, sec_7, nanosec_7, sec_8, nanosec_8, history_3, reliability_3,
+                    durability_3, liveliness_3, sec_9, nanosec_9, n23) = _u6(data, p)
+                q = p + 36
+                p = q + n23
+                name_9 = data[q : p - 1].decode()
+                version_4, value_4 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_4, sec_10, nanosec_10, sec_11, nanosec_11, history_4, reliability_4,
+                    durability_4, liveliness_4, sec_12, nanosec_12) = _u7(data, p)
+                p += 32
+                service_clients.append(Service(name_7,
+                    InterfaceType(name_8, TypeHash(version_3, value_3)),
+                    QoSProfile(depth_3, Duration(sec_7, nanosec_7), Duration(sec_8, nanosec_8),
+                    history_3, reliability_3, durability_3, liveliness_3,
+                    Duration(sec_9, nanosec_9)),
+                    InterfaceType(name_9, TypeHash(version_4, value_4)),
+                    QoSProfile(depth_4, Duration(sec_10, nanosec_10), Duration(sec_11, nanosec_11),
+                    history_4, reliability_4, durability_4, liveliness_4,
+                    Duration(sec_12, nanosec_12))))
+            (n24,) = _u5(data, p)
+            service_servers = []
+            p = p + 4
+            for _ in range(n24):
+                (n25,) = _u5(data, p)
+                q = p + 4
+                p = q + n25
+                name_10 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n26,) = _u5(data, p)
+                q = p + 4
+                p = q + n26
+                name_11 = data[q : p - 1].decode()
+                version_5, value_5 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_5, sec_13, nanosec_13, sec_14, nanosec_14, history_5, reliability_5,
+                    durability_5, liveliness_5, sec_15, nanosec_15, n27) = _u6(data, p)
+                q = p + 36
+                p = q + n27
+                name_12 = data[q : p - 1].decode()
+                version_6, value_6 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_6, sec_16, nanosec_16, sec_17, nanosec_17, history_6, reliability_6,
+                    durability_6, liveliness_6, sec_18, nanosec_18) = _u7(data, p)
+                p += 32
+                service_servers.append(Service(name_10,
+                    InterfaceType(name_11, TypeHash(version_5, value_5)),
+                    QoSProfile(depth_5, Duration(sec_13, nanosec_13), Duration(sec_14, nanosec_14),
+                    history_5, reliability_5, durability_5, liveliness_5,
+                    Duration(sec_15, nanosec_15)),
+                    InterfaceType(name_12, TypeHash(version_6, value_6)),
+                    QoSProfile(depth_6, Duration(sec_16, nanosec_16), Duration(sec_17, nanosec_17),
+                    history_6, reliability_6, durability_6, liveliness_6,
+                    Duration(sec_18, nanosec_18))))
+            (n28,) = _u5(data, p)
+            action_clients = []
+            p = p + 4
+            for _ in range(n28):
+                (n29,) = _u5(data, p)
+                q = p + 4
+                p = q + n29
+                name_13 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n30,) = _u5(data, p)
+                q = p + 4
+                p = q + n30
+                name_14 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n31,) = _u5(data, p)
+                q = p + 4
+                p = q + n31
+                name_15 = data[q : p - 1].decode()
+                version_7, value_7 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_7, sec_19, nanosec_19, sec_20, nanosec_20, history_7, reliability_7,
+                    durability_7, liveliness_7, sec_21, nanosec_21, n32) = _u6(data, p)
+                q = p + 36
+                p = q + n32
+                name_16 = data[q : p - 1].decode()
+                version_8, value_8 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_8, sec_22, nanosec_22, sec_23, nanosec_23, history_8, reliability_8,
+                    durability_8, liveliness_8, sec_24, nanosec_24, n33) = _u6(data, p)
+                q = p + 36
+                p = q + n33
+                name_17 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n34,) = _u5(data, p)
+                q = p + 4
+                p = q + n34
+                name_18 = data[q : p - 1].decode()
+                version_9, value_9 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_9, sec_25, nanosec_25, sec_26, nanosec_26, history_9, reliability_9,
+                    durability_9, liveliness_9, sec_27, nanosec_27, n35) = _u6(data, p)
+                q = p + 36
+                p = q + n35
+                name_19 = data[q : p - 1].decode()
+                version_10, value_10 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_10, sec_28, nanosec_28, sec_29, nanosec_29, history_10, reliability_10,
+                    durability_10, liveliness_10, sec_30, nanosec_30, n36) = _u6(data, p)
+                q = p + 36
+                p = q + n36
+                name_20 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n37,) = _u5(data, p)
+                q = p + 4
+                p = q + n37
+                name_21 = data[q : p - 1].decode()
+                version_11, value_11 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_11, sec_31, nanosec_31, sec_32, nanosec_32, history_11, reliability_11,
+                    durability_11, liveliness_11, sec_33, nanosec_33, n38) = _u6(data, p)
+                q = p + 36
+                p = q + n38
+                name_22 = data[q : p - 1].decode()
+                version_12, value_12 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_12, sec_34, nanosec_34, sec_35, nanosec_35, history_12, reliability_12,
+                    durability_12, liveliness_12, sec_36, nanosec_36, n39) = _u6(data, p)
+                q = p + 36
+                p = q + n39
+                name_23 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n40,) = _u5(data, p)
+                q = p + 4
+                p = q + n40
+                name_24 = data[q : p - 1].decode()
+                version_13, value_13 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_13, sec_37, nanosec_37, sec_38, nanosec_38, history_13, reliability_13,
+                    durability_13, liveliness_13, sec_39, nanosec_39, n41) = _u6(data, p)
+                q = p + 36
+                p = q + n41
+                name_25 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n42,) = _u5(data, p)
+                q = p + 4
+                p = q + n42
+                name_26 = data[q : p - 1].decode()
+                version_14, value_14 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_14, sec_40, nanosec_40, sec_41, nanosec_41, history_14, reliability_14,
+                    durability_14, liveliness_14, sec_42, nanosec_42) = _u7(data, p)
+                p += 32
+                action_clients.append(Action(name_13,
+                    Service(name_14, InterfaceType(name_15, TypeHash(version_7, value_7)),
+                    QoSProfile(depth_7, Duration(sec_19, nanosec_19), Duration(sec_20, nanosec_20),
+                    history_7, reliability_7, durability_7, liveliness_7,
+                    Duration(sec_21, nanosec_21)),
+                    InterfaceType(name_16, TypeHash(version_8, value_8)),
+                    QoSProfile(depth_8, Duration(sec_22, nanosec_22), Duration(sec_23, nanosec_23),
+                    history_8, reliability_8, durability_8, liveliness_8,
+                    Duration(sec_24, nanosec_24))),
+                    Service(name_17, InterfaceType(name_18, TypeHash(version_9, value_9)),
+                    QoSProfile(depth_9, Duration(sec_25, nanosec_25), Duration(sec_26, nanosec_26),
+                    history_9, reliability_9, durability_9, liveliness_9,
+                    Duration(sec_27, nanosec_27)),
+                    InterfaceType(name_19, TypeHash(version_10, value_10)),
+                    QoSProfile(depth_10, Duration(sec_28, nanosec_28),
+                    Duration(sec_29, nanosec_29), history_10, reliability_10, durability_10,
+                    liveliness_10, Duration(sec_30, nanosec_30))),
+                    Service(name_20, InterfaceType(name_21, TypeHash(version_11, value_11)),
+                    QoSProfile(depth_11, Duration(sec_31, nanosec_31),
+                    Duration(sec_32, nanosec_32), history_11, reliability_11, durability_11,
+                    liveliness_11, Duration(sec_33, nanosec_33)),
+                    InterfaceType(name_22, TypeHash(version_12, value_12)),
+                    QoSProfile(depth_12, Duration(sec_34, nanosec_34),
+                    Duration(sec_35, nanosec_35), history_12, reliability_12, durability_12,
+                    liveliness_12, Duration(sec_36, nanosec_36))),
+                    Topic(name_23, InterfaceType(name_24, TypeHash(version_13, value_13)),
+                    QoSProfile(depth_13, Duration(sec_37, nanosec_37),
+                    Duration(sec_38, nanosec_38), history_13, reliability_13, durability_13,
+                    liveliness_13, Duration(sec_39, nanosec_39))),
+                    Topic(name_25, InterfaceType(name_26, TypeHash(version_14, value_14)),
+                    QoSProfile(depth_14, Duration(sec_40, nanosec_40),
+                    Duration(sec_41, nanosec_41), history_14, reliability_14, durability_14,
+                    liveliness_14, Duration(sec_42, nanosec_42)))))
+            (n43,) = _u5(data, p)
+            action_servers = []
+            p = p + 4
+            for _ in range(n43):
+                (n44,) = _u5(data, p)
+                q = p + 4
+                p = q + n44
+                name_27 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n45,) = _u5(data, p)
+                q = p + 4
+                p = q + n45
+                name_28 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n46,) = _u5(data, p)
+                q = p + 4
+                p = q + n46
+                name_29 = data[q : p - 1].decode()
+                version_15, value_15 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_15, sec_43, nanosec_43, sec_44, nanosec_44, history_15, reliability_15,
+                    durability_15, liveliness_15, sec_45, nanosec_45, n47) = _u6(data, p)
+                q = p + 36
+                p = q + n47
+                name_30 = data[q : p - 1].decode()
+                version_16, value_16 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_16, sec_46, nanosec_46, sec_47, nanosec_47, history_16, reliability_16,
+                    durability_16, liveliness_16, sec_48, nanosec_48, n48) = _u6(data, p)
+                q = p + 36
+                p = q + n48
+                name_31 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n49,) = _u5(data, p)
+                q = p + 4
+                p = q + n49
+                name_32 = data[q : p - 1].decode()
+                version_17, value_17 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_17, sec_49, nanosec_49, sec_50, nanosec_50, history_17, reliability_17,
+                    durability_17, liveliness_17, sec_51, nanosec_51, n50) = _u6(data, p)
+                q = p + 36
+                p = q + n50
+                name_33 = data[q : p - 1].decode()
+                version_18, value_18 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_18, sec_52, nanosec_52, sec_53, nanosec_53, history_18, reliability_18,
+                    durability_18, liveliness_18, sec_54, nanosec_54, n51) = _u6(data, p)
+                q = p + 36
+                p = q + n51
+                name_34 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n52,) = _u5(data, p)
+                q = p + 4
+                p = q + n52
+                name_35 = data[q : p - 1].decode()
+                version_19, value_19 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_19, sec_55, nanosec_55, sec_56, nanosec_56, history_19, reliability_19,
+                    durability_19, liveliness_19, sec_57, nanosec_57, n53) = _u6(data, p)
+                q = p + 36
+                p = q + n53
+                name_36 = data[q : p - 1].decode()
+                version_20, value_20 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_20, sec_58, nanosec_58, sec_59, nanosec_59, history_20, reliability_20,
+                    durability_20, liveliness_20, sec_60, nanosec_60, n54) = _u6(data, p)
+                q = p + 36
+                p = q + n54
+                name_37 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n55,) = _u5(data, p)
+                q = p + 4
+                p = q + n55
+                name_38 = data[q : p - 1].decode()
+                version_21, value_21 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_21, sec_61, nanosec_61, sec_62, nanosec_62, history_21, reliability_21,
+                    durability_21, liveliness_21, sec_63, nanosec_63, n56) = _u6(data, p)
+                q = p + 36
+                p = q + n56
+                name_39 = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n57,) = _u5(data, p)
+                q = p + 4
+                p = q + n57
+                name_40 = data[q : p - 1].decode()
+                version_22, value_22 = _u3(data, p)
+                p = p + 36 & -4
+                (depth_22, sec_64, nanosec_64, sec_65, nanosec_65, history_22, reliability_22,
+                    durability_22, liveliness_22, sec_66, nanosec_66) = _u7(data, p)
+                p += 32
+                action_servers.append(Action(name_27,
+                    Service(name_28, InterfaceType(name_29, TypeHash(version_15, value_15)),
+                    QoSProfile(depth_15, Duration(sec_43, nanosec_43),
+                    Duration(sec_44, nanosec_44), history_15, reliability_15, durability_15,
+                    liveliness_15, Duration(sec_45, nanosec_45)),
+                    InterfaceType(name_30, TypeHash(version_16, value_16)),
+                    QoSProfile(depth_16, Duration(sec_46, nanosec_46),
+                    Duration(sec_47, nanosec_47), history_16, reliability_16, durability_16,
+                    liveliness_16, Duration(sec_48, nanosec_48))),
+                    Service(name_31, InterfaceType(name_32, TypeHash(version_17, value_17)),
+                    QoSProfile(depth_17, Duration(sec_49, nanosec_49),
+                    Duration(sec_50, nanosec_50), history_17, reliability_17, durability_17,
+                    liveliness_17, Duration(sec_51, nanosec_51)),
+                    InterfaceType(name_33, TypeHash(version_18, value_18)),
+                    QoSProfile(depth_18, Duration(sec_52, nanosec_52),
+                    Duration(sec_53, nanosec_53), history_18, reliability_18, durability_18,
+                    liveliness_18, Duration(sec_54, nanosec_54))),
+                    Service(name_34, InterfaceType(name_35, TypeHash(version_19, value_19)),
+                    QoSProfile(depth_19, Duration(sec_55, nanosec_55),
+                    Duration(sec_56, nanosec_56), history_19, reliability_19, durability_19,
+                    liveliness_19, Duration(sec_57, nanosec_57)),
+                    InterfaceType(name_36, TypeHash(version_20, value_20)),
+                    QoSProfile(depth_20, Duration(sec_58, nanosec_58),
+                    Duration(sec_59, nanosec_59), history_20, reliability_20, durability_20,
+                    liveliness_20, Duration(sec_60, nanosec_60))),
+                    Topic(name_37, InterfaceType(name_38, TypeHash(version_21, value_21)),
+                    QoSProfile(depth_21, Duration(sec_61, nanosec_61),
+                    Duration(sec_62, nanosec_62), history_21, reliability_21, durability_21,
+                    liveliness_21, Duration(sec_63, nanosec_63))),
+                    Topic(name_39, InterfaceType(name_40, TypeHash(version_22, value_22)),
+                    QoSProfile(depth_22, Duration(sec_64, nanosec_64),
+                    Duration(sec_65, nanosec_65), history_22, reliability_22, durability_22,
+                    liveliness_22, Duration(sec_66, nanosec_66)))))
+            if p > len(data): raise ValueError
+            return Node(name, parameters, parameter_values, publishers, subscriptions,
+                service_clients, service_servers, action_clients, action_servers)
+        except _FAULTS:
+            return _explain(data, Node)
+
+
+_p7 = _Struct("<2I").pack
+_t18 = _Stride("I $ I", None, 8)
+_s2 = _StringList()
+
+
+class Graph(_Message):
+    """All nodes of a system."""
+
+    nodes: list[Node] = []
+    _type = "rosgraph_msgs/Graph"
+    _type_name = "rosgraph_msgs/msg/Graph"
+    _type_hash = "RIHS01_46e58f3566aba3e489d14877ea71c339e4267aaa769bcd9d7e2d031850a05dfb"
+    _md5sum = "07a4b880449343403bc66caf249b49ac"
+    _text = (
+        "# All nodes of a system.\n"
+        "\n"
+        "Node[] nodes\n"
+    )
+    _schema = (("nodes", Node, "[]"),)
+
+    @staticmethod
+    def _encode(m: _Any) -> bytes:
+        try:
+            nodes = m.nodes
+            n1 = len(nodes)
+            out = [_p7(256, n1)]
+            p2 = 4
+            for nodes_one in nodes:
+                n3, b3 = _texts[nodes_one.name]
+                parameters = nodes_one.parameters
+                n4 = len(parameters)
+                f5, p6 = _t18[p2, n3]
+                out.append(f5(n3, b3, n4))
+                p7 = p6
+                for parameters_one in parameters:
+                    n8, b8 = _texts[parameters_one.name]
+                    b9 = parameters_one.description.encode()
+                    if 0 in b9: raise ValueError
+                    n9 = len(b9) + 1
+                    b10 = parameters_one.additional_constraints.encode()
+                    if 0 in b10: raise ValueError
+                    n10 = len(b10) + 1
+                    f11, p12 = _t9[p7, n8, n9]
+                    floating_point_range = parameters_one.floating_point_range
+                    n13 = len(floating_point_range)
+                    if n13 > 1: raise ValueError
+                    f14, p15 = _t10[p12, n10]
+                    p16 = 0 if n13 else p15
+                    integer_range = parameters_one.integer_range
+                    n17 = len(integer_range)
+                    if n17 > 1: raise ValueError
+                    p18 = 0 if n17 else p16 + n13 * 24 + 4
+                    out += (f11(n8, b8, parameters_one.type, n9, b9),
+                        f14(n10, b10, _TRUTH[parameters_one.read_only],
+                        _TRUTH[parameters_one.dynamic_typing], n13),
+                        (_PADDING[-(p15) & 7] if n13 else b""),
+                        b"".join([_p4(e.from_value, e.to_value,
+                        e.step) for e in floating_point_range]), _p5(n17),
+                        (_PADDING[-(p16 + n13 * 24 + 4) & 7] if n17 else b""),
+                        b"".join([_p6(e.from_value, e.to_value, e.step) for e in integer_range]))
+                    p7 = p18 + n17 * 24 & 7
+                parameter_values = nodes_one.parameter_values
+                n19 = len(parameter_values)
+                out.append(_p5(n19))
+                p20 = p7 + 4 & 7
+                for parameter_values_one in parameter_values:
+                    b21 = parameter_values_one.string_value.encode()
+                    if 0 in b21: raise ValueError
+                    n21 = len(b21) + 1
+                    byte_array_value = parameter_values_one.byte_array_value
+                    if type(byte_array_value) is not bytes:
+                        byte_array_value = _octets(byte_array_value)
+                    n22 = len(byte_array_value)
+                    f23, p24 = _t11[p20, n21]
+                    bool_array_value = parameter_values_one.bool_array_value
+                    bool_array_value = _flags(bool_array_value)
+                    n25 = len(bool_array_value)
+                    f26, p27 = _t12[p24 + n22 & 7]
+                    integer_array_value = parameter_values_one.integer_array_value
+                    if (
+                        type(integer_array_value) is not _array
+                        or integer_array_value.typecode != "q"
+                    ):
+                        n28, integer_array_value = _numbers(integer_array_value, "q")
+                    else:
+                        n28 = len(integer_array_value)
+                    f29, p30 = _t12[p27 + n25 & 7]
+                    p31 = 0 if n28 else p30
+                    double_array_value = parameter_values_one.double_array_value
+                    if type(double_array_value) is not _array or double_array_value.typecode != "d":
+                        n32, double_array_value = _numbers(double_array_value, "d")
+                    else:
+                        n32 = len(double_array_value)
+                    p33 = 0 if n32 else p31 + n28 * 8 + 4
+                    string_array_value, k = parameter_values_one.string_array_value, _s2.written
+                    b34 = k[1] if string_array_value == k[0] else _s2.put(string_array_value)
+                    n34 = len(b34)
+                    out += (f23(parameter_values_one.type, _TRUTH[parameter_values_one.bool_value],
+                        parameter_values_one.integer_value, parameter_values_one.double_value, n21,
+                        b21, n22), byte_array_value, f26(n25), bool_array_value, f29(n28),
+                        (_PADDING[-(p30) & 7] if n28 else b""), integer_array_value, _p5(n32),
+                        (_PADDING[-(p31 + n28 * 8 + 4) & 7] if n32 else b""), double_array_value,
+                        b34)
+                    p20 = p33 + n32 * 8 + n34 & 7
+                publishers = nodes_one.publishers
+                n35 = len(publishers)
+                f36, p37 = _t12[p20]
+                out.append(f36(n35))
+                p38 = p37
+                for publishers_one in publishers:
+                    n39, b39 = _texts[publishers_one.name]
+                    type_2 = publishers_one.type
+                    n40, b40 = _texts[type_2.name]
+                    hash_2 = type_2.hash
+                    value = hash_2.value
+                    if type(value) is not bytes or len(value) != 32:
+                        value = bytes(_octets(value, 32))
+                    qos = publishers_one.qos
+                    deadline = qos.deadline
+                    lifespan = qos.lifespan
+                    liveliness_lease_duration = qos.liveliness_lease_duration
+                    f41, p42 = _t13[p38, n39, n40]
+                    out.append(f41(n39, b39, n40, b40, hash_2.version, value, qos.depth,
+                        deadline.sec, deadline.nanosec, lifespan.sec, lifespan.nanosec,
+                        qos.history, qos.reliability, qos.durability, qos.liveliness,
+                        liveliness_lease_duration.sec, liveliness_lease_duration.nanosec))
+                    p38 = p42
+                subscriptions = nodes_one.subscriptions
+                n43 = len(subscriptions)
+                out.append(_p5(n43))
+                p44 = p38 + 4 & 7
+                for subscriptions_one in subscriptions:
+                    n45, b45 = _texts[subscriptions_one.name]
+                    type_3 = subscriptions_one.type
+                    n46, b46 = _texts[type_3.name]
+                    hash_3 = type_3.hash
+                    value_2 = hash_3.value
+                    if type(value_2) is not bytes or len(value_2) != 32:
+                        value_2 = bytes(_octets(value_2, 32))
+                    qos_2 = subscriptions_one.qos
+                    deadline_2 = qos_2.deadline
+                    lifespan_2 = qos_2.lifespan
+                    liveliness_lease_duration_2 = qos_2.liveliness_lease_duration
+                    f47, p48 = _t13[p44, n45, n46]
+                    out.append(f47(n45, b45, n46, b46, hash_3.version, value_2, qos_2.depth,
+                        deadline_2.sec, deadline_2.nanosec, lifespan_2.sec, lifespan_2.nanosec,
+                        qos_2.history, qos_2.reliability, qos_2.durability, qos_2.liveliness,
+                        liveliness_lease_duration_2.sec, liveliness_lease_duration_2.nanosec))
+                    p44 = p48
+                service_clients = nodes_one.service_clients
+                n49 = len(service_clients)
+                out.append(_p5(n49))
+                p50 = p44 + 4 & 7
+                for service_clients_one in service_clients:
+                    n51, b51 = _texts[service_clients_one.name]
+                    request_type = service_clients_one.request_type
+                    n52, b52 = _texts[request_type.name]
+                    hash_4 = request_type.hash
+                    value_3 = hash_4.value
+                    if type(value_3) is not bytes or len(value_3) != 32:
+                        value_3 = bytes(_octets(value_3, 32))
+                    request_qos = service_clients_one.request_qos
+                    deadline_3 = request_qos.deadline
+                    lifespan_3 = request_qos.lifespan
+                    liveliness_lease_duration_3 = request_qos.liveliness_lease_duration
+                    response_type = service_clients_one.response_type
+                    n53, b53 = _texts[response_type.name]
+                    f54, p55 = _t13[p50, n51, n52]
+                    hash_5 = response_type.hash
+                    value_4 = hash_5.value
+                    if type(value_4) is not bytes or len(value_4) != 32:
+                        value_4 = bytes(_octets(value_4, 32))
+                    response_qos = service_clients_one.response_qos
+                    deadline_4 = response_qos.deadline
+                    lifespan_4 = response_qos.lifespan
+                    liveliness_lease_duration_4 = response_qos.liveliness_lease_duration
+                    f56, p57 = _t14[p55, n53]
+                    out += (f54(n51, b51, n52, b52, hash_4.version, value_3, request_qos.depth,
+                        deadline_3.sec, deadline_3.nanosec, lifespan_3.sec, lifespan_3.nanosec,
+                        request_qos.history, request_qos.reliability, request_qos.durability,
+                        request_qos.liveliness, liveliness_lease_duration_3.sec,
+                        liveliness_lease_duration_3.nanosec),
+                        f56(n53, b53, hash_5.version, value_4, response_qos.depth, deadline_4.sec,
+                        deadline_4.nanosec, lifespan_4.sec, lifespan_4.nanosec,
+                        response_qos.history, response_qos.reliability, response_qos.durability,
+                        response_qos.liveliness, liveliness_lease_duration_4.sec,
+                        liveliness_lease_duration_4.nanosec))
+                    p50 = p57
+                service_servers = nodes_one.service_servers
+                n58 = len(service_servers)
+                out.append(_p5(n58))
+                p59 = p50 + 4 & 7
+                for service_servers_one in service_servers:
+                    n60, b60 = _texts[service_servers_one.name]
+                    request_type_2 = service_servers_one.request_type
+                    n61, b61 = _texts[request_type_2.name]
+                    hash_6 = request_type_2.hash
+                    value_5 = hash_6.value
+                    if type(value_5) is not bytes or len(value_5) != 32:
+                        value_5 = bytes(_octets(value_5, 32))
+                    request_qos_2 = service_servers_one.request_qos
+                    deadline_5 = request_qos_2.deadline
+                    lifespan_5 = request_qos_2.lifespan
+                    liveliness_lease_duration_5 = request_qos_2.liveliness_lease_duration
+                    response_type_2 = service_servers_one.response_type
+                    n62, b62 = _texts[response_type_2.name]
+                    f63, p64 = _t13[p59, n60, n61]
+                    hash_7 = response_type_2.hash
+                    value_6 = hash_7.value
+                    if type(value_6) is not bytes or len(value_6) != 32:
+                        value_6 = bytes(_octets(value_6, 32))
+                    response_qos_2 = service_servers_one.response_qos
+                    deadline_6 = response_qos_2.deadline
+                    lifespan_6 = response_qos_2.lifespan
+                    liveliness_lease_duration_6 = response_qos_2.liveliness_lease_duration
+                    f65, p66 = _t14[p64, n62]
+                    out += (f63(n60, b60, n61, b61, hash_6.version, value_5, request_qos_2.depth,
+                        deadline_5.sec, deadline_5.nanosec, lifespan_5.sec, lifespan_5.nanosec,
+                        request_qos_2.history, request_qos_2.reliability, request_qos_2.durability,
+                        request_qos_2.liveliness, liveliness_lease_duration_5.sec,
+                        liveliness_lease_duration_5.nanosec),
+                        f65(n62, b62, hash_7.version, value_6, response_qos_2.depth,
+                        deadline_6.sec, deadline_6.nanosec, lifespan_6.sec, lifespan_6.nanosec,
+                        response_qos_2.history, response_qos_2.reliability,
+                        response_qos_2.durability, response_qos_2.liveliness,
+                        liveliness_lease_duration_6.sec, liveliness_lease_duration_6.nanosec))
+                    p59 = p66
+                action_clients = nodes_one.action_clients
+                n67 = len(action_clients)
+                out.append(_p5(n67))
+                p68 = p59 + 4 & 7
+                for action_clients_one in action_clients:
+                    n69, b69 = _texts[action_clients_one.name]
+                    send_goal = action_clients_one.send_goal
+                    n70, b70 = _texts[send_goal.name]
+                    request_type_3 = send_goal.request_type
+                    n71, b71 = _texts[request_type_3.name]
+                    f72, p73 = _t15[p68, n69, n70]
+                    hash_8 = request_type_3.hash
+                    value_7 = hash_8.value
+                    if type(value_7) is not bytes or len(value_7) != 32:
+                        value_7 = bytes(_octets(value_7, 32))
+                    request_qos_3 = send_goal.request_qos
+                    deadline_7 = request_qos_3.deadline
+                    lifespan_7 = request_qos_3.lifespan
+                    liveliness_lease_duration_7 = request_qos_3.liveliness_lease_duration
+                    response_type_3 = send_goal.response_type
+                    n74, b74 = _texts[response_type_3.name]
+                    hash_9 = response_type_3.hash
+                    value_8 = hash_9.value
+                    if type(value_8) is not bytes or len(value_8) != 32:
+                        value_8 = bytes(_octets(value_8, 32))
+                    response_qos_3 = send_goal.response_qos
+                    deadline_8 = response_qos_3.deadline
+                    lifespan_8 = response_qos_3.lifespan
+                    liveliness_lease_duration_8 = response_qos_3.liveliness_lease_duration
+                    get_result = action_clients_one.get_result
+                    n75, b75 = _texts[get_result.name]
+                    f76, p77 = _t16[p73, n71, n74]
+                    request_type_4 = get_result.request_type
+                    n78, b78 = _texts[request_type_4.name]
+                    hash_10 = request_type_4.hash
+                    value_9 = hash_10.value
+                    if type(value_9) is not bytes or len(value_9) != 32:
+                        value_9 = bytes(_octets(value_9, 32))
+                    request_qos_4 = get_result.request_qos
+                    deadline_9 = request_qos_4.deadline
+                    lifespan_9 = request_qos_4.lifespan
+                    liveliness_lease_duration_9 = request_qos_4.liveliness_lease_duration
+                    response_type_4 = get_result.response_type
+                    n79, b79 = _texts[response_type_4.name]
+                    f80, p81 = _t13[p77, n75, n78]
+                    hash_11 = response_type_4.hash
+                    value_10 = hash_11.value
+                    if type(value_10) is not bytes or len(value_10) != 32:
+                        value_10 = bytes(_octets(value_10, 32))
+                    response_qos_4 = get_result.response_qos
+                    deadline_10 = response_qos_4.deadline
+                    lifespan_10 = response_qos_4.lifespan
+                    liveliness_lease_duration_10 = response_qos_4.liveliness_lease_duration
+                    cancel_goal = action_clients_one.cancel_goal
+                    n82, b82 = _texts[cancel_goal.name]
+                    request_type_5 = cancel_goal.request_type
+                    n83, b83 = _texts[request_type_5.name]
+                    f84, p85 = _t17[p81, n79, n82]
+                    hash_12 = request_type_5.hash
+                    value_11 = hash_12.value
+                    if type(value_11) is not bytes or len(value_11) != 32:
+                        value_11 = bytes(_octets(value_11, 32))
+                    request_qos_5 = cancel_goal.request_qos
+                    deadline_11 = request_qos_5.deadline
+                    lifespan_11 = request_qos_5.lifespan
+                    liveliness_lease_duration_11 = request_qos_5.liveliness_lease_duration
+                    response_type_5 = cancel_goal.response_type
+                    n86, b86 = _texts[response_type_5.name]
+                    hash_13 = response_type_5.hash
+                    value_12 = hash_13.value
+                    if type(value_12) is not bytes or len(value_12) != 32:
+                        value_12 = bytes(_octets(value_12, 32))
+                    response_qos_5 = cancel_goal.response_qos
+                    deadline_12 = response_qos_5.deadline
+                    lifespan_12 = response_qos_5.lifespan
+                    liveliness_lease_duration_12 = response_qos_5.liveliness_lease_duration
+                    feedback = action_clients_one.feedback
+                    n87, b87 = _texts[feedback.name]
+                    f88, p89 = _t16[p85, n83, n86]
+                    type_4 = feedback.type
+                    n90, b90 = _texts[type_4.name]
+                    hash_14 = type_4.hash
+                    value_13 = hash_14.value
+                    if type(value_13) is not bytes or len(value_13) != 32:
+                        value_13 = bytes(_octets(value_13, 32))
+                    qos_3 = feedback.qos
+                    deadline_13 = qos_3.deadline
+                    lifespan_13 = qos_3.lifespan
+                    liveliness_lease_duration_13 = qos_3.liveliness_lease_duration
+                    status = action_clients_one.status
+                    n91, b91 = _texts[status.name]
+                    f92, p93 = _t13[p89, n87, n90]
+                    type_5 = status.type
+                    n94, b94 = _texts[type_5.name]
+                    hash_15 = type_5.hash
+                    value_14 = hash_15.value
+                    if type(value_14) is not bytes or len(value_14) != 32:
+                        value_14 = bytes(_octets(value_14, 32))
+                    qos_4 = status.qos
+                    deadline_14 = qos_4.deadline
+                    lifespan_14 = qos_4.lifespan
+                    liveliness_lease_duration_14 = qos_4.liveliness_lease_duration
+                    f95, p96 = _t13[p93, n91, n94]
+                    out += (f72(n69, b69, n70, b70),
+                        f76(n71, b71, hash_8.version, value_7, request_qos_3.depth, deadline_7.sec,
+                        deadline_7.nanosec, lifespan_7.sec, lifespan_7.nanosec,
+                        request_qos_3.history, request_qos_3.reliability, request_qos_3.durability,
+                        request_qos_3.liveliness, liveliness_lease_duration_7.sec,
+                        liveliness_lease_duration_7.nanosec, n74, b74, hash_9.version, value_8,
+                        response_qos_3.depth, deadline_8.sec, deadline_8.nanosec, lifespan_8.sec,
+                        lifespan_8.nanosec, response_qos_3.history, response_qos_3.reliability,
+                        response_qos_3.durability, response_qos_3.liveliness,
+                        liveliness_lease_duration_8.sec, liveliness_lease_duration_8.nanosec),
+                        f80(n75, b75, n78, b78, hash_10.version, value_9, request_qos_4.depth,
+                        deadline_9.sec, deadline_9.nanosec, lifespan_9.sec, lifespan_9.nanosec,
+                        request_qos_4.history, request_qos_4.reliability, request_qos_4.durability,
+                        request_qos_4.liveliness, liveliness_lease_duration_9.sec,
+                        liveliness_lease_duration_9.nanosec),
+                        f84(n79, b79, hash_11.version, value_10, response_qos_4.depth,
+                        deadline_10.sec, deadline_10.nanosec, lifespan_10.sec, lifespan_10.nanosec,
+                        response_qos_4.history, response_qos_4.reliability,
+                        response_qos_4.durability, response_qos_4.liveliness,
+                        liveliness_lease_duration_10.sec, liveliness_lease_duration_10.nanosec,
+                        n82, b82),
+                        f88(n83, b83, hash_12.version, value_11, request_qos_5.depth,
+                        deadline_11.sec, deadline_11.nanosec, lifespan_11.sec, lifespan_11.nanosec,
+                        request_qos_5.history, request_qos_5.reliability, request_qos_5.durability,
+                        request_qos_5.liveliness, liveliness_lease_duration_11.sec,
+                        liveliness_lease_duration_11.nanosec, n86, b86, hash_13.version, value_12,
+                        response_qos_5.depth, deadline_12.sec, deadline_12.nanosec,
+                        lifespan_12.sec, lifespan_12.nanosec, response_qos_5.history,
+                        response_qos_5.reliability, response_qos_5.durability,
+                        response_qos_5.liveliness, liveliness_lease_duration_12.sec,
+                        liveliness_lease_duration_12.nanosec),
+                        f92(n87, b87, n90, b90, hash_14.version, value_13, qos_3.depth,
+                        deadline_13.sec, deadline_13.nanosec, lifespan_13.sec, lifespan_13.nanosec,
+                        qos_3.history, qos_3.reliability, qos_3.durability, qos_3.liveliness,
+                        liveliness_lease_duration_13.sec, liveliness_lease_duration_13.nanosec),
+                        f95(n91, b91, n94, b94, hash_15.version, value_14, qos_4.depth,
+                        deadline_14.sec, deadline_14.nanosec, lifespan_14.sec, lifespan_14.nanosec,
+                        qos_4.history, qos_4.reliability, qos_4.durability, qos_4.liveliness,
+                        liveliness_lease_duration_14.sec, liveliness_lease_duration_14.nanosec))
+                    p68 = p96
+                action_servers = nodes_one.action_servers
+                n97 = len(action_servers)
+                out.append(_p5(n97))
+                p98 = p68 + 4 & 7
+                for action_servers_one in action_servers:
+                    n99, b99 = _texts[action_servers_one.name]
+                    send_goal_2 = action_servers_one.send_goal
+                    n100, b100 = _texts[send_goal_2.name]
+                    request_type_6 = send_goal_2.request_type
+                    n101, b101 = _texts[request_type_6.name]
+                    f102, p103 = _t15[p98, n99, n100]
+                    hash_16 = request_type_6.hash
+                    value_15 = hash_16.value
+                    if type(value_15) is not bytes or len(value_15) != 32:
+                        value_15 = bytes(_octets(value_15, 32))
+                    request_qos_6 = send_goal_2.request_qos
+                    deadline_15 = request_qos_6.deadline
+                    lifespan_15 = request_qos_6.lifespan
+                    liveliness_lease_duration_15 = request_qos_6.liveliness_lease_duration
+                    response_type_6 = send_goal_2.response_type
+                    n104, b104 = _texts[response_type_6.name]
+                    hash_17 = response_type_6.hash
+                    value_16 = hash_17.value
+                    if type(value_16) is not bytes or len(value_16) != 32:
+                        value_16 = bytes(_octets(value_16, 32))
+                    response_qos_6 = send_goal_2.response_qos
+                    deadline_16 = response_qos_6.deadline
+                    lifespan_16 = response_qos_6.lifespan
+                    liveliness_lease_duration_16 = response_qos_6.liveliness_lease_duration
+                    get_result_2 = action_servers_one.get_result
+                    n105, b105 = _texts[get_result_2.name]
+                    f106, p107 = _t16[p103, n101, n104]
+                    request_type_7 = get_result_2.request_type
+                    n108, b108 = _texts[request_type_7.name]
+                    hash_18 = request_type_7.hash
+                    value_17 = hash_18.value
+                    if type(value_17) is not bytes or len(value_17) != 32:
+                        value_17 = bytes(_octets(value_17, 32))
+                    request_qos_7 = get_result_2.request_qos
+                    deadline_17 = request_qos_7.deadline
+                    lifespan_17 = request_qos_7.lifespan
+                    liveliness_lease_duration_17 = request_qos_7.liveliness_lease_duration
+                    response_type_7 = get_result_2.response_type
+                    n109, b109 = _texts[response_type_7.name]
+                    f110, p111 = _t13[p107, n105, n108]
+                    hash_19 = response_type_7.hash
+                    value_18 = hash_19.value
+                    if type(value_18) is not bytes or len(value_18) != 32:
+                        value_18 = bytes(_octets(value_18, 32))
+                    response_qos_7 = get_result_2.response_qos
+                    deadline_18 = response_qos_7.deadline
+                    lifespan_18 = response_qos_7.lifespan
+                    liveliness_lease_duration_18 = response_qos_7.liveliness_lease_duration
+                    cancel_goal_2 = action_servers_one.cancel_goal
+                    n112, b112 = _texts[cancel_goal_2.name]
+                    request_type_8 = cancel_goal_2.request_type
+                    n113, b113 = _texts[request_type_8.name]
+                    f114, p115 = _t17[p111, n109, n112]
+                    hash_20 = request_type_8.hash
+                    value_19 = hash_20.value
+                    if type(value_19) is not bytes or len(value_19) != 32:
+                        value_19 = bytes(_octets(value_19, 32))
+                    request_qos_8 = cancel_goal_2.request_qos
+                    deadline_19 = request_qos_8.deadline
+                    lifespan_19 = request_qos_8.lifespan
+                    liveliness_lease_duration_19 = request_qos_8.liveliness_lease_duration
+                    response_type_8 = cancel_goal_2.response_type
+                    n116, b116 = _texts[response_type_8.name]
+                    hash_21 = response_type_8.hash
+                    value_20 = hash_21.value
+                    if type(value_20) is not bytes or len(value_20) != 32:
+                        value_20 = bytes(_octets(value_20, 32))
+                    response_qos_8 = cancel_goal_2.response_qos
+                    deadline_20 = response_qos_8.deadline
+                    lifespan_20 = response_qos_8.lifespan
+                    liveliness_lease_duration_20 = response_qos_8.liveliness_lease_duration
+                    feedback_2 = action_servers_one.feedback
+                    n117, b117 = _texts[feedback_2.name]
+                    f118, p119 = _t16[p115, n113, n116]
+                    type_6 = feedback_2.type
+                    n120, b120 = _texts[type_6.name]
+                    hash_22 = type_6.hash
+                    value_21 = hash_22.value
+                    if type(value_21) is not bytes or len(value_21) != 32:
+                        value_21 = bytes(_octets(value_21, 32))
+                    qos_5 = feedback_2.qos
+                    deadline_21 = qos_5.deadline
+                    lifespan_21 = qos_5.lifespan
+                    liveliness_lease_duration_21 = qos_5.liveliness_lease_duration
+                    status_2 = action_servers_one.status
+                    n121, b121 = _texts[status_2.name]
+                    f122, p123 = _t13[p119, n117, n120]
+                    type_7 = status_2.type
+                    n124, b124 = _texts[type_7.name]
+                    hash_23 = type_7.hash
+                    value_22 = hash_23.value
+                    if type(value_22) is not bytes or len(value_22) != 32:
+                        value_22 = bytes(_octets(value_22, 32))
+                    qos_6 = status_2.qos
+                    deadline_22 = qos_6.deadline
+                    lifespan_22 = qos_6.lifespan
+                    liveliness_lease_duration_22 = qos_6.liveliness_lease_duration
+                    f125, p126 = _t13[p123, n121, n124]
+                    out += (f102(n99, b99, n100, b100),
+                        f106(n101, b101, hash_16.version, value_15, request_qos_6.depth,
+                        deadline_15.sec, deadline_15.nanosec, lifespan_15.sec, lifespan_15.nanosec,
+                        request_qos_6.history, request_qos_6.reliability, request_qos_6.durability,
+                        request_qos_6.liveliness, liveliness_lease_duration_15.sec,
+                        liveliness_lease_duration_15.nanosec, n104, b104, hash_17.version,
+                        value_16, response_qos_6.depth, deadline_16.sec, deadline_16.nanosec,
+                        lifespan_16.sec, lifespan_16.nanosec, response_qos_6.history,
+                        response_qos_6.reliability, response_qos_6.durability,
+                        response_qos_6.liveliness, liveliness_lease_duration_16.sec,
+                        liveliness_lease_duration_16.nanosec),
+                        f110(n105, b105, n108, b108, hash_18.version, value_17,
+                        request_qos_7.depth, deadline_17.sec, deadline_17.nanosec, lifespan_17.sec,
+                        lifespan_17.nanosec, request_qos_7.history, request_qos_7.reliability,
+                        request_qos_7.durability, request_qos_7.liveliness,
+                        liveliness_lease_duration_17.sec, liveliness_lease_duration_17.nanosec),
+                        f114(n109, b109, hash_19.version, value_18, response_qos_7.depth,
+                        deadline_18.sec, deadline_18.nanosec, lifespan_18.sec, lifespan_18.nanosec,
+                        response_qos_7.history, response_qos_7.reliability,
+                        response_qos_7.durability, response_qos_7.liveliness,
+                        liveliness_lease_duration_18.sec, liveliness_lease_duration_18.nanosec,
+                        n112, b112),
+                        f118(n113, b113, hash_20.version, value_19, request_qos_8.depth,
+                        deadline_19.sec, deadline_19.nanosec, lifespan_19.sec, lifespan_19.nanosec,
+                        request_qos_8.history, request_qos_8.reliability, request_qos_8.durability,
+                        request_qos_8.liveliness, liveliness_lease_duration_19.sec,
+                        liveliness_lease_duration_19.nanosec, n116, b116, hash_21.version,
+                        value_20, response_qos_8.depth, deadline_20.sec, deadline_20.nanosec,
+                        lifespan_20.sec, lifespan_20.nanosec, response_qos_8.history,
+                        response_qos_8.reliability, response_qos_8.durability,
+                        response_qos_8.liveliness, liveliness_lease_duration_20.sec,
+                        liveliness_lease_duration_20.nanosec),
+                        f122(n117, b117, n120, b120, hash_22.version, value_21, qos_5.depth,
+                        deadline_21.sec, deadline_21.nanosec, lifespan_21.sec, lifespan_21.nanosec,
+                        qos_5.history, qos_5.reliability, qos_5.durability, qos_5.liveliness,
+                        liveliness_lease_duration_21.sec, liveliness_lease_duration_21.nanosec),
+                        f125(n121, b121, n124, b124, hash_23.version, value_22, qos_6.depth,
+                        deadline_22.sec, deadline_22.nanosec, lifespan_22.sec, lifespan_22.nanosec,
+                        qos_6.history, qos_6.reliability, qos_6.durability, qos_6.liveliness,
+                        liveliness_lease_duration_22.sec, liveliness_lease_duration_22.nanosec))
+                    p98 = p126
+                p2 = p98
+            return b"".join(out)
+        except _FAULTS:
+            return _plain(m, Graph)
+
+    @staticmethod
+    def _decode(data: bytes) -> Graph:
+        try:
+            h, n1 = _u2(data)
+            if h != 256: raise ValueError
+            nodes = []
+            p = 8
+            for _ in range(n1):
+                (n2,) = _u5(data, p)
+                q = p + 4
+                p = q + n2
+                name = data[q : p - 1].decode()
+                p = p + 3 & -4
+                (n3,) = _u5(data, p)
+                parameters = []
+                p = p + 4
+                for _ in range(n3):
+                    (n4,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n4
+                    name_2 = data[q : p - 1].decode()
+                    type_2 = data[p]
+                    p = p + 4 & -4
+                    (n5,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n5
+                    description = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n6,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n6
+                    additional_constraints = data[q : p - 1].decode()
+                    read_only, dynamic_typing = _u9(data, p)
+                    p = p + 5 & -4
+                    (n7,) = _u5(data, p)
+                    if n7 > 1: raise ValueError
+                    q = (p + 7 | 7) - 3 if n7 else p + 4
+                    p = q + n7 * 24
+                    floating_point_range = list(_starmap(FloatingPointRange, _i1(data[q : p])))
+                    (n8,) = _u5(data, p)
+                    if n8 > 1: raise ValueError
+                    q = (p + 7 | 7) - 3 if n8 else p + 4
+                    p = q + n8 * 24
+                    integer_range = list(_starmap(IntegerRange, _i2(data[q : p])))
+                    parameters.append(ParameterDescriptor(name_2, type_2, description,
+                        additional_constraints, read_only, dynamic_typing, floating_point_range,
+                        integer_range))
+                (n9,) = _u5(data, p)
+                parameter_values = []
+                p = p + 4
+                for _ in range(n9):
+                    type_3, bool_value = _u10(data, p)
+                    p = (p + 5 | 7) - 3
+                    integer_value, double_value, n10 = _u11(data, p)
+                    q = p + 20
+                    p = q + n10
+                    string_value = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n11,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n11
+                    byte_array_value = data[q : p]
+                    p = p + 3 & -4
+                    (n12,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n12
+                    bool_array_value = _read_flags(data[q : p])
+                    p = p + 3 & -4
+                    (n13,) = _u5(data, p)
+                    q = (p + 7 | 7) - 3 if n13 else p + 4
+                    p = q + n13 * 8
+                    integer_array_value = _array("q",
+                        data[q : p]) if n13 < 8192 else _read_block("q", data, q, p)
+                    (n14,) = _u5(data, p)
+                    q = (p + 7 | 7) - 3 if n14 else p + 4
+                    p = q + n14 * 8
+                    double_array_value = _array("d",
+                        data[q : p]) if n14 < 8192 else _read_block("d", data, q, p)
+                    k, string_array_value = _s2.read
+                    if data.startswith(k, p):
+                        p = p + len(k)
+                        string_array_value = string_array_value[:]
+                    else:
+                        string_array_value, p = _s2.take(data, p)
+                    parameter_values.append(ParameterValue(type_3, bool_value, integer_value,
+                        double_value, string_value, byte_array_value, bool_array_value,
+                        integer_array_value, double_array_value, string_array_value))
+                p = p + 3 & -4
+                (n15,) = _u5(data, p)
+                publishers = []
+                p = p + 4
+                for _ in range(n15):
+                    (n16,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n16
+                    name_3 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n17,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n17
+                    name_4 = data[q : p - 1].decode()
+                    version, value = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth, sec, nanosec, sec_2, nanosec_2, history, reliability, durability,
+                        liveliness, sec_3, nanosec_3) = _u7(data, p)
+                    p += 32
+                    publishers.append(Topic(name_3,
+                        InterfaceType(name_4, TypeHash(version, value)),
+                        QoSProfile(depth, Duration(sec, nanosec), Duration(sec_2, nanosec_2),
+                        history, reliability, durability, liveliness, Duration(sec_3, nanosec_3))))
+                (n18,) = _u5(data, p)
+                subscriptions = []
+                p = p + 4
+                for _ in range(n18):
+                    (n19,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n19
+                    name_5 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n20,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n20
+                    name_6 = data[q : p - 1].decode()
+                    version_2, value_2 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_2, sec_4, nanosec_4, sec_5, nanosec_5, history_2, reliability_2,
+                        durability_2, liveliness_2, sec_6, nanosec_6) = _u7(data, p)
+                    p += 32
+                    subscriptions.append(Topic(name_5,
+                        InterfaceType(name_6, TypeHash(version_2, value_2)),
+                        QoSProfile(depth_2, Duration(sec_4, nanosec_4), Duration(sec_5, nanosec_5),
+                        history_2, reliability_2, durability_2, liveliness_2,
+                        Duration(sec_6, nanosec_6))))
+                (n21,) = _u5(data, p)
+                service_clients = []
+                p = p + 4
+                for _ in range(n21):
+                    (n22,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n22
+                    name_7 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n23,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n23
+                    name_8 = data[q : p - 1].decode()
+                    version_3, value_3 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_3, sec_7, nanosec_7, sec_8, nanosec_8, history_3, reliability_3,
+                        durability_3, liveliness_3, sec_9, nanosec_9, n24) = _u6(data, p)
+                    q = p + 36
+                    p = q + n24
+                    name_9 = data[q : p - 1].decode()
+                    version_4, value_4 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_4, sec_10, nanosec_10, sec_11, nanosec_11, history_4, reliability_4,
+                        durability_4, liveliness_4, sec_12, nanosec_12) = _u7(data, p)
+                    p += 32
+                    service_clients.append(Service(name_7,
+                        InterfaceType(name_8, TypeHash(version_3, value_3)),
+                        QoSProfile(depth_3, Duration(sec_7, nanosec_7), Duration(sec_8, nanosec_8),
+                        history_3, reliability_3, durability_3, liveliness_3,
+                        Duration(sec_9, nanosec_9)),
+                        InterfaceType(name_9, TypeHash(version_4, value_4)),
+                        QoSProfile(depth_4, Duration(sec_10, nanosec_10),
+                        Duration(sec_11, nanosec_11), history_4, reliability_4, durability_4,
+                        liveliness_4, Duration(sec_12, nanosec_12))))
+                (n25,) = _u5(data, p)
+                service_servers = []
+                p = p + 4
+                for _ in range(n25):
+                    (n26,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n26
+                    name_10 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n27,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n27
+                    name_11 = data[q : p - 1].decode()
+                    version_5, value_5 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_5, sec_13, nanosec_13, sec_14, nanosec_14, history_5, reliability_5,
+                        durability_5, liveliness_5, sec_15, nanosec_15, n28) = _u6(data, p)
+                    q = p + 36
+                    p = q + n28
+                    name_12 = data[q : p - 1].decode()
+                    version_6, value_6 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_6, sec_16, nanosec_16, sec_17, nanosec_17, history_6, reliability_6,
+                        durability_6, liveliness_6, sec_18, nanosec_18) = _u7(data, p)
+                    p += 32
+                    service_servers.append(Service(name_10,
+                        InterfaceType(name_11, TypeHash(version_5, value_5)),
+                        QoSProfile(depth_5, Duration(sec_13, nanosec_13),
+                        Duration(sec_14, nanosec_14), history_5, reliability_5, durability_5,
+                        liveliness_5, Duration(sec_15, nanosec_15)),
+                        InterfaceType(name_12, TypeHash(version_6, value_6)),
+                        QoSProfile(depth_6, Duration(sec_16, nanosec_16),
+                        Duration(sec_17, nanosec_17), history_6, reliability_6, durability_6,
+                        liveliness_6, Duration(sec_18, nanosec_18))))
+                (n29,) = _u5(data, p)
+                action_clients = []
+                p = p + 4
+                for _ in range(n29):
+                    (n30,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n30
+                    name_13 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n31,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n31
+                    name_14 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n32,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n32
+                    name_15 = data[q : p - 1].decode()
+                    version_7, value_7 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_7, sec_19, nanosec_19, sec_20, nanosec_20, history_7, reliability_7,
+                        durability_7, liveliness_7, sec_21, nanosec_21, n33) = _u6(data, p)
+                    q = p + 36
+                    p = q + n33
+                    name_16 = data[q : p - 1].decode()
+                    version_8, value_8 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_8, sec_22, nanosec_22, sec_23, nanosec_23, history_8, reliability_8,
+                        durability_8, liveliness_8, sec_24, nanosec_24, n34) = _u6(data, p)
+                    q = p + 36
+                    p = q + n34
+                    name_17 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n35,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n35
+                    name_18 = data[q : p - 1].decode()
+                    version_9, value_9 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_9, sec_25, nanosec_25, sec_26, nanosec_26, history_9, reliability_9,
+                        durability_9, liveliness_9, sec_27, nanosec_27, n36) = _u6(data, p)
+                    q = p + 36
+                    p = q + n36
+                    name_19 = data[q : p - 1].decode()
+                    version_10, value_10 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_10, sec_28, nanosec_28, sec_29, nanosec_29, history_10, reliability_10,
+                        durability_10, liveliness_10, sec_30, nanosec_30, n37) = _u6(data, p)
+                    q = p + 36
+                    p = q + n37
+                    name_20 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n38,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n38
+                    name_21 = data[q : p - 1].decode()
+                    version_11, value_11 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_11, sec_31, nanosec_31, sec_32, nanosec_32, history_11, reliability_11,
+                        durability_11, liveliness_11, sec_33, nanosec_33, n39) = _u6(data, p)
+                    q = p + 36
+                    p = q + n39
+                    name_22 = data[q : p - 1].decode()
+                    version_12, value_12 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_12, sec_34, nanosec_34, sec_35, nanosec_35, history_12, reliability_12,
+                        durability_12, liveliness_12, sec_36, nanosec_36, n40) = _u6(data, p)
+                    q = p + 36
+                    p = q + n40
+                    name_23 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n41,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n41
+                    name_24 = data[q : p - 1].decode()
+                    version_13, value_13 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_13, sec_37, nanosec_37, sec_38, nanosec_38, history_13, reliability_13,
+                        durability_13, liveliness_13, sec_39, nanosec_39, n42) = _u6(data, p)
+                    q = p + 36
+                    p = q + n42
+                    name_25 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n43,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n43
+                    name_26 = data[q : p - 1].decode()
+                    version_14, value_14 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_14, sec_40, nanosec_40, sec_41, nanosec_41, history_14, reliability_14,
+                        durability_14, liveliness_14, sec_42, nanosec_42) = _u7(data, p)
+                    p += 32
+                    action_clients.append(Action(name_13,
+                        Service(name_14, InterfaceType(name_15, TypeHash(version_7, value_7)),
+                        QoSProfile(depth_7, Duration(sec_19, nanosec_19),
+                        Duration(sec_20, nanosec_20), history_7, reliability_7, durability_7,
+                        liveliness_7, Duration(sec_21, nanosec_21)),
+                        InterfaceType(name_16, TypeHash(version_8, value_8)),
+                        QoSProfile(depth_8, Duration(sec_22, nanosec_22),
+                        Duration(sec_23, nanosec_23), history_8, reliability_8, durability_8,
+                        liveliness_8, Duration(sec_24, nanosec_24))),
+                        Service(name_17, InterfaceType(name_18, TypeHash(version_9, value_9)),
+                        QoSProfile(depth_9, Duration(sec_25, nanosec_25),
+                        Duration(sec_26, nanosec_26), history_9, reliability_9, durability_9,
+                        liveliness_9, Duration(sec_27, nanosec_27)),
+                        InterfaceType(name_19, TypeHash(version_10, value_10)),
+                        QoSProfile(depth_10, Duration(sec_28, nanosec_28),
+                        Duration(sec_29, nanosec_29), history_10, reliability_10, durability_10,
+                        liveliness_10, Duration(sec_30, nanosec_30))),
+                        Service(name_20, InterfaceType(name_21, TypeHash(version_11, value_11)),
+                        QoSProfile(depth_11, Duration(sec_31, nanosec_31),
+                        Duration(sec_32, nanosec_32), history_11, reliability_11, durability_11,
+                        liveliness_11, Duration(sec_33, nanosec_33)),
+                        InterfaceType(name_22, TypeHash(version_12, value_12)),
+                        QoSProfile(depth_12, Duration(sec_34, nanosec_34),
+                        Duration(sec_35, nanosec_35), history_12, reliability_12, durability_12,
+                        liveliness_12, Duration(sec_36, nanosec_36))),
+                        Topic(name_23, InterfaceType(name_24, TypeHash(version_13, value_13)),
+                        QoSProfile(depth_13, Duration(sec_37, nanosec_37),
+                        Duration(sec_38, nanosec_38), history_13, reliability_13, durability_13,
+                        liveliness_13, Duration(sec_39, nanosec_39))),
+                        Topic(name_25, InterfaceType(name_26, TypeHash(version_14, value_14)),
+                        QoSProfile(depth_14, Duration(sec_40, nanosec_40),
+                        Duration(sec_41, nanosec_41), history_14, reliability_14, durability_14,
+                        liveliness_14, Duration(sec_42, nanosec_42)))))
+                (n44,) = _u5(data, p)
+                action_servers = []
+                p = p + 4
+                for _ in range(n44):
+                    (n45,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n45
+                    name_27 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n46,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n46
+                    name_28 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n47,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n47
+                    name_29 = data[q : p - 1].decode()
+                    version_15, value_15 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_15, sec_43, nanosec_43, sec_44, nanosec_44, history_15, reliability_15,
+                        durability_15, liveliness_15, sec_45, nanosec_45, n48) = _u6(data, p)
+                    q = p + 36
+                    p = q + n48
+                    name_30 = data[q : p - 1].decode()
+                    version_16, value_16 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_16, sec_46, nanosec_46, sec_47, nanosec_47, history_16, reliability_16,
+                        durability_16, liveliness_16, sec_48, nanosec_48, n49) = _u6(data, p)
+                    q = p + 36
+                    p = q + n49
+                    name_31 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n50,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n50
+                    name_32 = data[q : p - 1].decode()
+                    version_17, value_17 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_17, sec_49, nanosec_49, sec_50, nanosec_50, history_17, reliability_17,
+                        durability_17, liveliness_17, sec_51, nanosec_51, n51) = _u6(data, p)
+                    q = p + 36
+                    p = q + n51
+                    name_33 = data[q : p - 1].decode()
+                    version_18, value_18 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_18, sec_52, nanosec_52, sec_53, nanosec_53, history_18, reliability_18,
+                        durability_18, liveliness_18, sec_54, nanosec_54, n52) = _u6(data, p)
+                    q = p + 36
+                    p = q + n52
+                    name_34 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n53,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n53
+                    name_35 = data[q : p - 1].decode()
+                    version_19, value_19 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_19, sec_55, nanosec_55, sec_56, nanosec_56, history_19, reliability_19,
+                        durability_19, liveliness_19, sec_57, nanosec_57, n54) = _u6(data, p)
+                    q = p + 36
+                    p = q + n54
+                    name_36 = data[q : p - 1].decode()
+                    version_20, value_20 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_20, sec_58, nanosec_58, sec_59, nanosec_59, history_20, reliability_20,
+                        durability_20, liveliness_20, sec_60, nanosec_60, n55) = _u6(data, p)
+                    q = p + 36
+                    p = q + n55
+                    name_37 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n56,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n56
+                    name_38 = data[q : p - 1].decode()
+                    version_21, value_21 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_21, sec_61, nanosec_61, sec_62, nanosec_62, history_21, reliability_21,
+                        durability_21, liveliness_21, sec_63, nanosec_63, n57) = _u6(data, p)
+                    q = p + 36
+                    p = q + n57
+                    name_39 = data[q : p - 1].decode()
+                    p = p + 3 & -4
+                    (n58,) = _u5(data, p)
+                    q = p + 4
+                    p = q + n58
+                    name_40 = data[q : p - 1].decode()
+                    version_22, value_22 = _u3(data, p)
+                    p = p + 36 & -4
+                    (depth_22, sec_64, nanosec_64, sec_65, nanosec_65, history_22, reliability_22,
+                        durability_22, liveliness_22, sec_66, nanosec_66) = _u7(data, p)
+                    p += 32
+                    action_servers.append(Action(name_27,
+                        Service(name_28, InterfaceType(name_29, TypeHash(version_15, value_15)),
+                        QoSProfile(depth_15, Duration(sec_43, nanosec_43),
+                        Duration(sec_44, nanosec_44), history_15, reliability_15, durability_15,
+                        liveliness_15, Duration(sec_45, nanosec_45)),
+                        InterfaceType(name_30, TypeHash(version_16, value_16)),
+                        QoSProfile(depth_16, Duration(sec_46, nanosec_46),
+                        Duration(sec_47, nanosec_47), history_16, reliability_16, durability_16,
+                        liveliness_16, Duration(sec_48, nanosec_48))),
+                        Service(name_31, InterfaceType(name_32, TypeHash(version_17, value_17)),
+                        QoSProfile(depth_17, Duration(sec_49, nanosec_49),
+                        Duration(sec_50, nanosec_50), history_17, reliability_17, durability_17,
+                        liveliness_17, Duration(sec_51, nanosec_51)),
+                        InterfaceType(name_33, TypeHash(version_18, value_18)),
+                        QoSProfile(depth_18, Duration(sec_52, nanosec_52),
+                        Duration(sec_53, nanosec_53), history_18, reliability_18, durability_18,
+                        liveliness_18, Duration(sec_54, nanosec_54))),
+                        Service(name_34, InterfaceType(name_35, TypeHash(version_19, value_19)),
+                        QoSProfile(depth_19, Duration(sec_55, nanosec_55),
+                        Duration(sec_56, nanosec_56), history_19, reliability_19, durability_19,
+                        liveliness_19, Duration(sec_57, nanosec_57)),
+                        InterfaceType(name_36, TypeHash(version_20, value_20)),
+                        QoSProfile(depth_20, Duration(sec_58, nanosec_58),
+                        Duration(sec_59, nanosec_59), history_20, reliability_20, durability_20,
+                        liveliness_20, Duration(sec_60, nanosec_60))),
+                        Topic(name_37, InterfaceType(name_38, TypeHash(version_21, value_21)),
+                        QoSProfile(depth_21, Duration(sec_61, nanosec_61),
+                        Duration(sec_62, nanosec_62), history_21, reliability_21, durability_21,
+                        liveliness_21, Duration(sec_63, nanosec_63))),
+                        Topic(name_39, InterfaceType(name_40, TypeHash(version_22, value_22)),
+                        QoSProfile(depth_22, Duration(sec_64, nanosec_64),
+                        Duration(sec_65, nanosec_65), history_22, reliability_22, durability_22,
+                        liveliness_22, Duration(sec_66, nanosec_66)))))
+                nodes.append(Node(name, parameters, parameter_values, publishers, subscriptions,
+                    service_clients, service_servers, action_clients, action_servers))
+            if p > len(data): raise ValueError
+            return Graph(nodes)
+        except _FAULTS:
+            return _explain(data, Graph)
+
+
+_t19 = _Stride("I i I I $ B I $", -4, 4)
+_t20 = _Stride("I $", None, 4)
+_s3 = _StringList()
+_t21 = _Template("I $ I $ I", None)
+_u12 = _Struct("<Ii2I").unpack_from
 
 
 class Log(_Stamped):
@@ -124,64 +2759,63 @@ class Log(_Stamped):
             b3 = m.msg.encode()
             if 0 in b3: raise ValueError
             n3 = len(b3) + 1
-            f4, p5 = _t1[n1, n2]
+            f4, p5 = _t19[n1, n2]
             n6, b6 = _texts[m.file]
-            f7, p8 = _t2[p5, n3]
+            f7, p8 = _t20[p5, n3]
             n9, b9 = _texts[m.function]
-            topics, k = m.topics, _s1.written
-            b10 = k[1] if topics == k[0] else _s1.put(topics)
+            topics, k = m.topics, _s3.written
+            b10 = k[1] if topics == k[0] else _s3.put(topics)
             n10 = len(b10)
             return b"".join((f4(256, stamp.sec, stamp.nanosec, n1, b1, m.level, n2, b2),
-                f7(n3, b3), _t3[p8, n6, n9](n6, b6, n9, b9, m.line), b10))
+                f7(n3, b3), _t21[p8, n6, n9](n6, b6, n9, b9, m.line), b10))
         except _FAULTS:
             return _plain(m, Log)
 
     @staticmethod
     def _decode(data: bytes) -> Log:
         try:
-            h, sec, nanosec, n1 = _u2(data)
+            h, sec, nanosec, n1 = _u12(data)
             if h != 256: raise ValueError
             p = 16 + n1
             frame_id = data[16 : p - 1].decode()
             level = data[p]
             p = p + 4 & -4
-            (n2,) = _u3(data, p)
+            (n2,) = _u5(data, p)
             q = p + 4
             p = q + n2
             name = data[q : p - 1].decode()
             p = p + 3 & -4
-            (n3,) = _u3(data, p)
+            (n3,) = _u5(data, p)
             q = p + 4
             p = q + n3
             msg = data[q : p - 1].decode()
             p = p + 3 & -4
-            (n4,) = _u3(data, p)
+            (n4,) = _u5(data, p)
             q = p + 4
             p = q + n4
             file = data[q : p - 1].decode()
             p = p + 3 & -4
-            (n5,) = _u3(data, p)
+            (n5,) = _u5(data, p)
             q = p + 4
             p = q + n5
             function = data[q : p - 1].decode()
             p = p + 3 & -4
-            (line,) = _u3(data, p)
-            k, topics = _s1.read
+            (line,) = _u5(data, p)
+            k, topics = _s3.read
             if data.startswith(k, p + 4):
                 p = p + 4 + len(k)
                 topics = topics[:]
             else:
-                topics, p = _s1.take(data, p + 4)
+                topics, p = _s3.take(data, p + 4)
             return Log(Header(0, Time(sec, nanosec), frame_id), level, name, msg, file, function,
                 line, topics)
         except _FAULTS:
             return _explain(data, Log)
 
 
-_t4 = _Stride("I I $", -4, 4)
-_t5 = _Template("I $ i I i I i i i i I i I i I i I i I i I", None)
-_u4 = _Struct("<2I").unpack_from
-_u5 = _Struct("<iIiI4iIiIiIiIiIiI").unpack_from
+_t22 = _Stride("I I $", -4, 4)
+_t23 = _Template("I $ i I i I i i i i I i I i I i I i I i I", None)
+_u13 = _Struct("<iIiI4iIiIiIiIiIiI").unpack_from
 
 
 class TopicStatistics(_Message):
@@ -245,11 +2879,11 @@ class TopicStatistics(_Message):
             b2 = m.node_pub.encode()
             if 0 in b2: raise ValueError
             n2 = len(b2) + 1
-            f3, p4 = _t4[n1]
+            f3, p4 = _t22[n1]
             b5 = m.node_sub.encode()
             if 0 in b5: raise ValueError
             n5 = len(b5) + 1
-            f6, p7 = _t2[p4, n2]
+            f6, p7 = _t20[p4, n2]
             window_start = m.window_start
             window_stop = m.window_stop
             period_mean = m.period_mean
@@ -259,7 +2893,7 @@ class TopicStatistics(_Message):
             stamp_age_stddev = m.stamp_age_stddev
             stamp_age_max = m.stamp_age_max
             return b"".join((f3(256, n1, b1), f6(n2, b2),
-                _t5[p7, n5](n5, b5, window_start.sec, window_start.nanosec, window_stop.sec,
+                _t23[p7, n5](n5, b5, window_start.sec, window_start.nanosec, window_stop.sec,
                 window_stop.nanosec, m.delivered_msgs, m.dropped_msgs, m.traffic, period_mean.sec,
                 period_mean.nanosec, period_stddev.sec, period_stddev.nanosec, period_max.sec,
                 period_max.nanosec, stamp_age_mean.sec, stamp_age_mean.nanosec,
@@ -271,24 +2905,24 @@ class TopicStatistics(_Message):
     @staticmethod
     def _decode(data: bytes) -> TopicStatistics:
         try:
-            h, n1 = _u4(data)
+            h, n1 = _u2(data)
             if h != 256: raise ValueError
             p = 8 + n1
             topic = data[8 : p - 1].decode()
             p = p + 3 & -4
-            (n2,) = _u3(data, p)
+            (n2,) = _u5(data, p)
             q = p + 4
             p = q + n2
             node_pub = data[q : p - 1].decode()
             p = p + 3 & -4
-            (n3,) = _u3(data, p)
+            (n3,) = _u5(data, p)
             q = p + 4
             p = q + n3
             node_sub = data[q : p - 1].decode()
             p = p + 3 & -4
             (sec, nanosec, sec_2, nanosec_2, delivered_msgs, dropped_msgs, traffic, sec_3,
                 nanosec_3, sec_4, nanosec_4, sec_5, nanosec_5, sec_6, nanosec_6, sec_7, nanosec_7,
-                sec_8, nanosec_8) = _u5(data, p)
+                sec_8, nanosec_8) = _u13(data, p)
             return TopicStatistics(topic, node_pub, node_sub, Time(sec, nanosec),
                 Time(sec_2, nanosec_2), delivered_msgs, dropped_msgs, traffic,
                 Duration(sec_3, nanosec_3), Duration(sec_4, nanosec_4), Duration(sec_5, nanosec_5),

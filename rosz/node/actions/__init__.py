@@ -30,13 +30,4 @@ if TYPE_CHECKING:
     )
     from rosz.node.actions.watch import LONGEST_SILENCE, ServerWatch
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "client": "ActionClient ClientGoal",
-            "server": "ActionServer GoalServer ServerGoal ServerOptions",
-            "states": "ACTIONLIB_STEPS CANCEL FEEDBACK FINAL RESULT RUNNING SEND STATUS TERMINAL"
-            " TO_ACTIONLIB TO_ROS2 ActionlibState GoalState",
-            "watch": "LONGEST_SILENCE ServerWatch",
-        },
-    )
+    __getattr__ = exports_of(__name__)

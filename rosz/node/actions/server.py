@@ -24,16 +24,7 @@ from rosz.msgs.action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
 from rosz.msgs.action_msgs.srv import CancelGoal, CancelGoalResponse
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
-from rosz.node.actions.states import (
-    CANCEL,
-    FEEDBACK,
-    FINAL,
-    RESULT,
-    SEND,
-    STATUS,
-    GoalState,
-    may_become,
-)
+from rosz.node.actions import states
 from rosz.node.core import NodeCore
 from rosz.node.publisher import Publisher
 from rosz.node.service import Call, CallService
@@ -64,21 +55,21 @@ class ServerGoal:
         self.request: Any = request
         self.accepted: int = accepted
         self._server = server
-        self._state = GoalState.ACCEPTED
+        self._state = states.GoalState.ACCEPTED
         self._cancelled = threading.Event()
         self._waiting: list[Call] = []
         self._response: bytes | None = None
         self.expires: float = 0.0
 
     @property
-    def status(self) -> GoalState:
+    def status(self) -> states.GoalState:
         """The state of the goal."""
         return self._state
 
     @property
     def done(self) -> bool:
         """Whether the goal has ended."""
-        return self._state in FINAL
+        return self._state in states.FINAL
 
     @property
     def cancel_requested(self) -> bool:
@@ -111,32 +102,32 @@ class ServerGoal:
             EncodeError: A value does not fit its field. The goal has not ended.
             UsageError: The goal has ended before, or is not executed yet.
         """
-        self._server.end(self, GoalState.SUCCEEDED, result)
+        self._server.end(self, states.GoalState.SUCCEEDED, result)
 
     def abort(self, result: Any = None) -> None:
         """End the goal as failed; arguments and errors as those of `succeed`."""
-        self._server.end(self, GoalState.ABORTED, result)
+        self._server.end(self, states.GoalState.ABORTED, result)
 
     def canceled(self, result: Any = None) -> None:
         """End the goal as cancelled; arguments and errors as those of `succeed`.
 
         A goal that nobody asked to end cannot be ended so.
         """
-        self._server.end(self, GoalState.CANCELED, result)
+        self._server.end(self, states.GoalState.CANCELED, result)
 
-    def move(self, state: GoalState) -> None:
+    def move(self, state: states.GoalState) -> None:
         """Go to another state; for the server, which holds its lock.
 
         Raises:
             UsageError: The goal cannot go there.
         """
-        if not may_become(self._state, state):
+        if not states.may_become(self._state, state):
             raise UsageError(
                 f"goal {self.id} of action '{self._server.name}' is {self._state.text}: it cannot"
                 f" become {state.text}"
             )
         self._state = state
-        if state is GoalState.CANCELING:
+        if state is states.GoalState.CANCELING:
             self._cancelled.set()
 
     def finish(self, response: bytes) -> list[Call]:
@@ -201,12 +192,12 @@ class GoalServer(Closing, ABC):
         """Declare the topics and services; goals may arrive before this returns."""
         node, name, keep = self._node, self.name, self._lifecycle.keep
         feedback = self.action_type.FeedbackMessage
-        self._feedback = keep(Publisher(node, f"{name}/{FEEDBACK}", feedback, DEFAULT))
-        self._status = keep(Publisher(node, f"{name}/{STATUS}", GoalStatusArray, LATCHED))
+        self._feedback = keep(Publisher(node, f"{name}/{states.FEEDBACK}", feedback, DEFAULT))
+        self._status = keep(Publisher(node, f"{name}/{states.STATUS}", GoalStatusArray, LATCHED))
         kinds: dict[str, tuple[Any, Callable[[Call], None]]] = {
-            RESULT: (self.action_type.GetResult, self._get_result),
-            CANCEL: (CancelGoal, self._cancel_goals),
-            SEND: (self.action_type.SendGoal, self._receive),
+            states.RESULT: (self.action_type.GetResult, self._get_result),
+            states.CANCEL: (CancelGoal, self._cancel_goals),
+            states.SEND: (self.action_type.SendGoal, self._receive),
         }
         for part, (kind, handle) in kinds.items():
             keep(CallService(node, f"{name}/{part}", kind, handle, SERVICES, _THREADS))
@@ -289,12 +280,12 @@ class GoalServer(Closing, ABC):
         """Ask a goal to end; return whether it does, and has not ended otherwise."""
         with self._lock:
             if goal.done:
-                return goal.status is GoalState.CANCELED
-            waits = goal.status is GoalState.ACCEPTED and self._options.policy != "parallel"
-            if goal.status is not GoalState.CANCELING:
-                goal.move(GoalState.CANCELING)
+                return goal.status is states.GoalState.CANCELED
+            waits = goal.status is states.GoalState.ACCEPTED and self._options.policy != "parallel"
+            if goal.status is not states.GoalState.CANCELING:
+                goal.move(states.GoalState.CANCELING)
         if waits:  # its turn would come too late
-            self.end(goal, GoalState.CANCELED, None)
+            self.end(goal, states.GoalState.CANCELED, None)
         else:
             self._publish_status()
         return True
@@ -303,7 +294,7 @@ class GoalServer(Closing, ABC):
         self._expire()
         goal = self._goals.get(bytes(call.request.goal_id.uuid))
         if goal is None:
-            call.answer(self._response(GoalState.UNKNOWN, None))
+            call.answer(self._response(states.GoalState.UNKNOWN, None))
             return
         with self._lock:
             if self._lifecycle.closing:
@@ -321,7 +312,7 @@ class GoalServer(Closing, ABC):
             UsageError: It is executed already, or has ended.
         """
         with self._lock:
-            goal.move(GoalState.EXECUTING)
+            goal.move(states.GoalState.EXECUTING)
         self._publish_status()
 
     def publish_feedback(self, goal: ServerGoal, feedback: Any) -> None:
@@ -329,7 +320,7 @@ class GoalServer(Closing, ABC):
         message = self.action_type.FeedbackMessage(UUID(goal.id.bytes), feedback)
         self._publish(self._feedback, message)
 
-    def end(self, goal: ServerGoal, state: GoalState, result: Any) -> None:
+    def end(self, goal: ServerGoal, state: states.GoalState, result: Any) -> None:
         """End a goal; see `ServerGoal.succeed`."""
         response = self._response(state, result)
         with self._lock:
@@ -342,7 +333,7 @@ class GoalServer(Closing, ABC):
             call.answer(response)
         self._publish_status()
 
-    def _response(self, state: GoalState, result: Any) -> bytes:
+    def _response(self, state: states.GoalState, result: Any) -> bytes:
         outcome = self.action_type.Result() if result is None else result
         return self.action_type.GetResult.Response(int(state), outcome).to_cdr()
 
@@ -445,8 +436,8 @@ class ActionServer(GoalServer):
         with self._lock:
             if goal.done or self._lifecycle.closing:
                 return
-            if goal.status is GoalState.ACCEPTED:
-                goal.move(GoalState.EXECUTING)
+            if goal.status is states.GoalState.ACCEPTED:
+                goal.move(states.GoalState.EXECUTING)
         self._publish_status()
         log = self._node.log
         try:
@@ -464,4 +455,4 @@ class ActionServer(GoalServer):
                 self.name,
             )
         if not goal.done:
-            self.end(goal, GoalState.ABORTED, None)
+            self.end(goal, states.GoalState.ABORTED, None)

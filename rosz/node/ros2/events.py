@@ -18,7 +18,7 @@ from rosz.msgs.rcl_interfaces.msg import Parameter, ParameterEvent, ParameterVal
 from rosz.node.core import NodeCore
 from rosz.node.publisher import Publisher
 from rosz.node.ros2.values import to_ros2
-from rosz.params import Path, Value, split
+from rosz.params import Path, Value, leaves, split
 from rosz.qos import PARAMETERS
 from rosz.worker import Worker
 
@@ -113,8 +113,6 @@ def _parameters(
     base: Path, value: Value | None, path: Path
 ) -> Iterator[tuple[str, ParameterValue]]:
     """Yield the parameters of a node at a path of the store and below it, by their names."""
-    if type(value) is dict:
-        for key, item in value.items():
-            yield from _parameters(base, item, (*path, key))
-    elif value is not None and len(path) > len(base):
-        yield ".".join(path[len(base) :]), to_ros2(value)
+    for place, item in leaves(value, path):
+        if item is not None and len(place) > len(base):
+            yield ".".join(place[len(base) :]), to_ros2(item)

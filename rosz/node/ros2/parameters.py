@@ -7,7 +7,7 @@ as lists of mixed items, appear as YAML text, and cannot be set from there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rosz.errors import ClosedError, ParamError
@@ -32,16 +32,8 @@ from rosz.msgs.rcl_interfaces.srv import (
 from rosz.node.core import NodeCore
 from rosz.node.ros2.values import from_ros2, to_ros2, type_of
 from rosz.node.service import Service
-from rosz.params import (
-    DELETED,
-    Change,
-    Path,
-    Value,
-    condense,
-    joined,
-    split,
-    type_name,
-)
+from rosz.node.standard import follow_clock
+from rosz.params import DELETED, Change, Path, Value, condense, joined, leaves, split, type_name
 from rosz.qos import PARAMETERS, SERVICES
 from rosz.session import Query
 from rosz.worker import Worker
@@ -70,8 +62,8 @@ class Ros2Parameters:
     def values(self) -> dict[str, tuple[Path, Value]]:
         """Return the paths in the store and the values of all parameters, by name."""
         top = self._node.params.get(self._node.name, None)
-        leaves = _leaves(self._base, top) if type(top) is dict else ()
-        return {_DOT.join(path[len(self._base) :]): (path, value) for path, value in leaves}
+        own = leaves(top, self._base) if type(top) is dict else ()
+        return {_DOT.join(path[len(self._base) :]): (path, value) for path, value in own}
 
     def get(self, names: Iterable[str]) -> list[ParameterValue]:
         """Return the values of some parameters; "not set" for those that do not exist.
@@ -126,6 +118,8 @@ class Ros2Parameters:
         changes = [self._change(parameter, present) for parameter in parameters]
         replica = self._node.context.params
         replica.write(condense(changes), origin=f"{self._node.name} for ROS 2 ({replica.label})")
+        if any(path == (*self._base, _SIM_TIME) for path, _ in changes):
+            follow_clock(self._node)
 
     def _all(self) -> dict[str, Value]:
         """Return the values by name, with ``use_sim_time``, which every node of ROS 2 has."""
@@ -136,6 +130,8 @@ class Ros2Parameters:
 
     def _change(self, parameter: Parameter, present: Mapping[str, tuple[Path, Value]]) -> Change:
         name, value = parameter.name, from_ros2(parameter.value)
+        if name == _SIM_TIME and type(value) is not bool and value is not DELETED:
+            raise ParamError(f"'{name}' cannot be the {type_name(value)} {value!r}; expected bool")
         if name in present:
             path, before = present[name]
             if type_of(before) == ParameterType.PARAMETER_NOT_SET:
@@ -144,11 +140,6 @@ class Ros2Parameters:
                     f" '{joined(path)}' with 'rosz param set'"
                 )
             return path, value
-        if name == _SIM_TIME:
-            raise ParamError(
-                "'use_sim_time' is the same for all nodes: set '/use_sim_time' with"
-                " 'rosz param set' before they start"
-            )
         path = split(joined((*self._base, *name.split(_DOT))))
         if path == self._base:
             raise ParamError(f"'{name}' is not the name of a parameter")
@@ -157,14 +148,6 @@ class Ros2Parameters:
         if any(other.startswith(f"{name}{_DOT}") for other in present):
             raise ParamError(f"'{name}' is not a parameter: there are parameters below it")
         return path, value
-
-
-def _leaves(path: Path, value: Value) -> Iterator[tuple[Path, Value]]:
-    if type(value) is dict:
-        for key, item in value.items():
-            yield from _leaves((*path, key), item)
-    else:
-        yield path, value
 
 
 def _lies_below(name: list[str], prefix: list[str], depth: int) -> bool:
@@ -182,7 +165,7 @@ def _described(name: str, value: Any) -> ParameterDescriptor:
             additional_constraints=f"YAML of a {type_name(value)}, which ROS 2 has no type for",
             read_only=True,
         )
-    return ParameterDescriptor(name, number, read_only=name == _SIM_TIME, dynamic_typing=True)
+    return ParameterDescriptor(name, number, dynamic_typing=True)
 
 
 class Ros2ParameterServices:
@@ -211,15 +194,16 @@ class Ros2ParameterServices:
 
     def _declare(self) -> None:
         node, keep = self.node, self._lifecycle.keep
-        session, domain = node.context.session, node.context.domain
         kinds = self._kinds()
+        queryables = []
         for package in sorted({kind._type_name.partition("/")[0] for kind, _ in kinds.values()}):
-            key = _OF_PACKAGE.format(domain=domain, node=node.name, package=package)
-            queryable = keep(session.pull_queryable(key, complete=True))
-            name = f"rosz-ros2{node.name}"
-            Worker(name, self._serve, receive=queryable.receive, threads=_THREADS)
+            key = _OF_PACKAGE.format(domain=node.context.domain, node=node.name, package=package)
+            queryables.append(keep(node.context.session.pull_queryable(key, complete=True)))
         for name, (kind, handler) in kinds.items():
             keep(_SharedService(self, f"{node.name}/{name}", kind, handler))
+        # A client that sees the first service may call any: requests wait until all are there.
+        for each in queryables:
+            Worker(f"rosz-ros2{node.name}", self._serve, receive=each.receive, threads=_THREADS)
 
     def _kinds(self) -> dict[str, tuple[type[ServiceType], _Handler]]:
         """Return the types and handlers of the services by their names."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -15,12 +16,11 @@ from rosz.idl import (
     describe,
     describe_field,
     is_service,
-    is_service_message,
     message_hash,
     service_hash,
     service_parts,
 )
-from rosz.message import Action
+from rosz.message import Action, Message
 from rosz.msgs.type_description_interfaces.msg import (
     Field,
     FieldType,
@@ -42,10 +42,11 @@ from rosz.wire import NO_HASH, Token
 
 _SERVICE = "get_type_description"
 _TEXTS = frozenset({"msg", "srv"})
+_PARTS = re.compile(r"^---[ \t]*$", re.MULTILINE)
 
 
 class TypeDefinition(msgspec.Struct, frozen=True):
-    """The definition of a message or service type, as another node has it.
+    """The definition of a type, as another node has it.
 
     Attributes:
         name: ``pkg/msg/Name`` or ``pkg/srv/Name``.
@@ -61,8 +62,8 @@ class TypeDefinition(msgspec.Struct, frozen=True):
 def request_definition(node: NodeCore, entity: Token, timeout: float = 10.0) -> TypeDefinition:
     """Request the definition of an entity's type from the node that the entity belongs to.
 
-    Nodes of rosz and of ROS 2 Jazzy or later have it; those of ROS 2 Humble do not. They have no
-    text of the types that ROS 2 derives from a service, but describe the fields.
+    Nodes of rosz and of ROS 2 Jazzy or later have it; those of ROS 2 Humble do not. Of a message
+    type without a text, such as one that ROS 2 derives from a service, they describe the fields.
 
     Args:
         node: The node that requests it.
@@ -83,7 +84,7 @@ def request_definition(node: NodeCore, entity: Token, timeout: float = 10.0) -> 
         for source in response.type_sources
         if source.encoding in _TEXTS
     }
-    if is_service_message(name):
+    if name not in texts and not is_service(name):
         texts = _lines_of(response.type_description)
     if name not in texts:
         raise TypeNotFound(name, f"node '{entity.node_name}' sent no text of its definition")
@@ -168,20 +169,32 @@ def request_action(
         response = _request(node, entity, timeout, sources=False)
         lines |= _lines_of(response.type_description)
     text = "---\n".join(lines.get(f"{name}_{part}", "") for part in ("Goal", "Result", "Feedback"))
-    others = {
-        type_name: text for type_name, text in lines.items() if type_name.split("/")[1] == "msg"
-    }
+    others = {type_name: text for type_name, text in lines.items() if "/msg/" in type_name}
     made = types.action_from_text(name, text, others)
     if not _has_types(made, entities):
         raise TypeNotFound(name, "what its server describes has another hash than the server uses")
     return made
 
 
+def event_class(types: TypeStore, service: str) -> type[Message]:
+    """Return the class of the events of a service, ``pkg/srv/Name_Event``.
+
+    Raises:
+        TypeNotFound: The service type is not known here.
+        DefinitionError: Its definition is not well-formed.
+    """
+    service = types.service(service)._type_name
+    parts = _PARTS.split(types.definition(service).text, maxsplit=1)
+    names = (f"{service}_Request", f"{service}_Response")
+    text = "service_msgs/ServiceEventInfo info\n{}[<=1] request\n{}[<=1] response\n".format(*names)
+    return types.message_from_text(f"{service}_Event", text, dict(zip(names, parts, strict=True)))
+
+
 def _has_types(action: type[Action], entities: Iterable[Token]) -> bool:
     """Return whether the services and the feedback of an action have the hashes of entities."""
     kinds = (action.SendGoal, action.GetResult, action.FeedbackMessage)
     hashes = {kind._type_name: kind._type_hash for kind in kinds}
-    return all(entity.type_hash in {NO_HASH, hashes[entity.type_name]} for entity in entities)
+    return all(entity.type_hash in {NO_HASH, hashes.get(entity.type_name)} for entity in entities)
 
 
 def _lines_of(whole: TypeDescription) -> dict[str, str]:
@@ -204,7 +217,7 @@ def _lines_of(whole: TypeDescription) -> dict[str, str]:
 def describe_type(
     types: TypeStore, request: GetTypeDescriptionRequest
 ) -> GetTypeDescriptionResponse:
-    """Return the response to a request for the definition of a message or service type.
+    """Return the response to a request for the definition of a type.
 
     Args:
         types: The types that are known here.

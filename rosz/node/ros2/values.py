@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from rosz.errors import ParamError
 from rosz.msgs.rcl_interfaces.msg import ParameterType, ParameterValue
-from rosz.params import DELETED, Deleted, Value, normalise
+from rosz.params import DELETED, Deleted, Value, normalise, type_name
 
 _FIELDS = {
     ParameterType.PARAMETER_BOOL: "bool_value",
@@ -39,6 +39,13 @@ _ARRAYS: Mapping[frozenset[type], int] = {
     frozenset({str}): ParameterType.PARAMETER_STRING_ARRAY,
 }
 
+_CONVERSIONS = frozenset(
+    {
+        (ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_DOUBLE),
+        (ParameterType.PARAMETER_INTEGER_ARRAY, ParameterType.PARAMETER_DOUBLE_ARRAY),
+    }
+)
+
 
 def type_of(value: Value) -> int:
     """Return the number of a value's type; ``PARAMETER_NOT_SET`` if ROS 2 has none for it."""
@@ -54,8 +61,33 @@ def to_ros2(value: Value) -> ParameterValue:
         from rosz.params.yaml import inline
 
         return ParameterValue(ParameterType.PARAMETER_STRING, string_value=inline(value))
+    return _made(number, value)
+
+
+def to_type(value: Value, number: int, name: str) -> ParameterValue:
+    """Return a value for a parameter of some type: ints become floats, and ``[]`` any array.
+
+    Args:
+        value: The value.
+        number: Type of the parameter.
+        name: Name of the parameter, for the error.
+
+    Raises:
+        ParamError: ROS 2 has no type for the value.
+    """
+    actual = type_of(value)
+    if actual == ParameterType.PARAMETER_NOT_SET:
+        raise ParamError(f"'{name}' cannot be the {type_name(value)} {value!r:.60} in ROS 2")
+    if (actual, number) in _CONVERSIONS or (value == [] and number in _ARRAYS.values()):
+        actual = number
+    return _made(actual, value)
+
+
+def _made(number: int, value: Value) -> ParameterValue:
     if number == ParameterType.PARAMETER_BYTE_ARRAY:
         value = bytes(value)
+    elif number == ParameterType.PARAMETER_DOUBLE:
+        value = float(value)
     return ParameterValue(number, **{_FIELDS[number]: value})
 
 

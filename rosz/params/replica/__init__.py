@@ -18,35 +18,8 @@ if TYPE_CHECKING:
     from rosz.params.replica.client import ParamClient
     from rosz.params.replica.core.effects import Outcome
     from rosz.params.replica.params import Params
-    from rosz.params.replica.replica import (
-        ACK_TIMEOUT,
-        Follower,
-        Replica,
-    )
+    from rosz.params.replica.replica import ACK_TIMEOUT, Follower, Replica
     from rosz.params.replica.storage import Storage, StoreFile
     from rosz.params.replica.watch import Changed, Watch
 else:
-    __getattr__ = exports_of(
-        __name__,
-        {
-            "client": "ParamClient",
-            "params": "Params",
-            "core.effects": "Outcome",
-            "replica": "ACK_TIMEOUT Follower Replica",
-            "storage": "Storage StoreFile",
-            "watch": "Changed Watch",
-        },
-    )
-
-__all__ = (
-    "ACK_TIMEOUT",
-    "Changed",
-    "Follower",
-    "Outcome",
-    "ParamClient",
-    "Params",
-    "Replica",
-    "Storage",
-    "StoreFile",
-    "Watch",
-)
+    __getattr__ = exports_of(__name__)

@@ -7,7 +7,8 @@ request.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Final
 
 from rosz.errors import (
@@ -22,12 +23,13 @@ from rosz.params.paths import joined, split
 from rosz.params.values import Value, normalise
 from rosz.params.wire import Batch, ClientReply, ClientRequest, Keys, ReplicaMember, decode, encode
 from rosz.params.writes import DELETED, Change
-from rosz.session import Session, Stamp, clamp_timeout
+from rosz.session import LONGEST_WAIT, Cancellation, Reply, Session, Stamp, clamp_timeout
 
 if TYPE_CHECKING:
     from rosz.params.replica.core.effects import Outcome
     from rosz.params.replica.replica import Follower
 
+_OnProgress = Callable[[int, list[str]], object]
 _TOKENS_TIMEOUT: Final = 2.0
 _REPLY_TIMEOUT: Final = 1.0
 """Seconds after which the next replica is asked."""
@@ -36,7 +38,7 @@ _LEAST_TIMEOUT: Final = 0.5
 """Least time in seconds that a write waits for all replicas, whatever it took to find one."""
 
 _SLOWEST: Final = 1e6
-"""Bytes of a batch that are sent and applied in a second at least."""
+"""Bytes of a batch that a replica reads in a second at least, before it reports progress."""
 
 _JOINING_PAUSE: Final = 0.02
 
@@ -112,11 +114,15 @@ class ParamClient:
         self._get(name)
         return self.write([(path, DELETED)])
 
-    def write(self, changes: Iterable[Change]) -> Outcome:
+    def write(self, changes: Iterable[Change], on_progress: _OnProgress | None = None) -> Outcome:
         """Write a batch, which every replica applies as one change.
+
+        The time limit counts from the last report of progress, so size alone does not exceed it.
 
         Args:
             changes: Paths with normalised values or `DELETED`, as `condense` returns them.
+            on_progress: Function called now and then with the number of replicas that have the
+                batch, and those that it waits for, as shown to users.
 
         Raises:
             ParamError: The tree cannot hold a change; nothing is changed then.
@@ -130,18 +136,16 @@ class ParamClient:
             self._find_members()
             return Outcome(0)
         began = time.monotonic()
-        deadline = began + self._timeout
-        seen = self._request(ClientRequest("stamp"), batch, deadline).value
+        seen = self._request(ClientRequest("stamp"), batch).value
         if type(seen) is not int:
             raise DecodeError("answer about parameters", -1, f"{seen!r}, expected a stamp")
         self._session.clock.observe(Stamp(seen, ""))
         stamp = self._session.stamp()
         message = Batch.of((stamp.time, stamp.id), self._origin or process_label(), batch)
-        # Size alone must not pass a limit: it takes time to send, to apply and to acknowledge it.
-        more = len(encode(message)) / _SLOWEST
-        timeout = min(ACK_TIMEOUT, self._timeout) - (time.monotonic() - began) + more
-        request = ClientRequest("write", batch=message, timeout=max(_LEAST_TIMEOUT, timeout))
-        reply = self._request(request, batch, deadline + 2 * more)
+        timeout = min(ACK_TIMEOUT, self._timeout) - (time.monotonic() - began)
+        timeout = max(_LEAST_TIMEOUT, timeout)
+        request = ClientRequest("write", batch=message, timeout=timeout, beats=True)
+        reply = self._request(request, batch, on_progress)
         return Outcome(stamp.time, tuple(reply.slow), reply.holders + 1)
 
     def follow(self) -> Follower:
@@ -174,13 +178,15 @@ class ParamClient:
         return self._members
 
     def _request(
-        self, request: ClientRequest, batch: Sequence[Change] = (), deadline: float | None = None
+        self,
+        request: ClientRequest,
+        batch: Sequence[Change] = (),
+        on_progress: _OnProgress | None = None,
     ) -> ClientReply:
         """Ask the replicas one after the other, last those that did not answer before."""
-        if deadline is None:
-            deadline = time.monotonic() + self._timeout
+        deadline = time.monotonic() + self._timeout
         payload = encode(request)
-        timeout = request.timeout + _REPLY_TIMEOUT + (len(payload) / _SLOWEST if batch else 0)
+        silence = request.timeout + _REPLY_TIMEOUT
         while True:
             stopped = self._session.out_of_reach()
             for member in sorted(
@@ -193,7 +199,7 @@ class ParamClient:
             ):
                 key = self._keys.of(member.zid, "set" if batch else "ask")
                 key = self._keys.scope(key, (path for path, _ in batch))
-                reply = self._request_from(member, key, payload, timeout)
+                reply = self._request_from(member, key, payload, silence, on_progress)
                 if reply is not None and reply.status != "joining":
                     self._answered = member.zid
                     if reply.status == "missing":
@@ -214,12 +220,38 @@ class ParamClient:
             time.sleep(_JOINING_PAUSE)
 
     def _request_from(
-        self, member: ReplicaMember, key: str, payload: bytes, timeout: float
+        self,
+        member: ReplicaMember,
+        key: str,
+        payload: bytes,
+        silence: float,
+        on_progress: _OnProgress | None,
     ) -> ClientReply | None:
-        replies = self._session.get(key, payload=payload, timeout=timeout)
-        for reply in replies:
-            if reply.ok:
-                return decode(reply.payload, ClientReply)
-        if replies:  # an error reply means that the time is over; no reply, that it is gone
-            self._silent[member.zid] = member
+        """Ask a replica; return its last reply, or ``None`` if it is gone or reports nothing."""
+        replies: SimpleQueue[Reply | None] = SimpleQueue()
+        cancellation = Cancellation()
+        self._session.get_async(
+            key,
+            replies.put,
+            lambda: replies.put(None),
+            payload=payload,
+            timeout=LONGEST_WAIT,
+            cancel=cancellation,
+        )
+        limit = silence + len(payload) / _SLOWEST
+        try:
+            while (reply := replies.get(timeout=limit)) is not None and reply.ok:
+                answer = decode(reply.payload, ClientReply)
+                if answer.status != "working":
+                    return answer
+                if on_progress is not None:
+                    on_progress(answer.holders + 1, answer.slow)
+                limit = silence
+            if reply is None:  # it is gone
+                return None
+        except Empty:
+            pass
+        finally:
+            cancellation.cancel()
+        self._silent[member.zid] = member
         return None

@@ -11,13 +11,13 @@ import struct
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from rosz.errors import DecodeError, RoszError
 from rosz.lifecycle import Closable
 from rosz.params.replica.core import effects, events
 from rosz.params.replica.core.store import NOT_A_PARAMETER
-from rosz.params.replica.runner import CoreRunner
+from rosz.params.replica.runner import CoreRunner, beat_until
 from rosz.params.wire import (
     Departure,
     Keys,
@@ -29,7 +29,7 @@ from rosz.params.wire import (
     encode,
     read_header,
 )
-from rosz.session import Query, RawPublisher, Reply, Sample, Session
+from rosz.session import LONGEST_WAIT, Query, RawPublisher, Reply, Sample, Session
 from rosz.worker import Worker
 
 _log = logging.getLogger("rosz.params")
@@ -39,6 +39,9 @@ _LARGE: Final = 16_384
 
 _ACK: Final = struct.Struct("<Q")
 _SEPARATOR: Final = b" "
+_AT_WORK: Final = b"+"
+_MOST_AT_WORK: Final = 8
+"""Large batches whose progress is reported at once, each on a thread of its own."""
 _MAX_WRITERS: Final = 100
 """Writers that are remembered, some with a publisher of their own for the acknowledgements to them;
 when there are more, all are forgotten."""
@@ -81,16 +84,19 @@ class Exchange:
         self._ack_publishers: dict[str, RawPublisher | None] = {}
         self._publisher: RawPublisher | None = None
         self._queries: dict[int, Query] = {}
+        self._at_work: dict[tuple[str, int], threading.Event] = {}
         self._numbers = itertools.count(1)
         self._lock = threading.RLock()
         self._declared: list[Closable] = []
-        self._here: dict[type[effects.Effect], Callable[[Any], object]] = {
+        runner.handlers |= {
             effects.Publish: self._publish,
             effects.Resend: self._resend,
             effects.Acknowledge: self._acknowledge,
             effects.SendQuery: self._query,
             effects.Reply: self._reply,
-            effects.FindStopped: self._find_stopped,
+            effects.FindStoppedPeers: lambda _: runner.run(
+                events.StoppedPeersFound(frozenset(session.out_of_reach()))
+            ),
         }
 
     def listen(self) -> None:
@@ -106,24 +112,11 @@ class Exchange:
             self._declared.append(
                 session.subscriber(key, self._on_change, remote_only=True, rare=True)
             )
-        purposes: tuple[tuple[Purpose, Callable[[Query], None]], ...] = (
-            ("write", self._on_resent),
-            ("sync", self._on_sync),
-            ("tell", self._on_writes),
-        )
-        for purpose, handle in purposes:
+        purposes: tuple[Purpose, ...] = ("write", "sync", "tell")
+        for purpose in purposes:
             key = keys.of(session.zid, purpose) + ("" if purpose == "sync" else "/**")
-            take = partial(self._on_query, handle)
+            take = partial(self._on_query, purpose)
             self._declared.append(session.queryable(key, take, complete=True))
-
-    def carry_out(self, effect: effects.Effect) -> None:
-        """Carry out an effect; sending much takes place in the background."""
-        handle = self._here.get(type(effect))
-        if handle is not None:
-            try:
-                handle(effect)
-            except RoszError as error:
-                _log.debug("%s is not done: %s", type(effect).__name__, error)
 
     def depart(self, kind: int) -> None:
         """Tell all others that this replica leaves, or restarts; a signal handler may do so."""
@@ -140,29 +133,43 @@ class Exchange:
             self._publisher.close()
         self._senders.close()
         self._close_ack_publishers()
+        for at_work in list(self._at_work):
+            self._end_work(*at_work)
         queries, self._queries = self._queries, {}
         for query in queries.values():
             query.close()
-
-    def _find_stopped(self, _: effects.FindStopped) -> None:
-        self._runner.run(events.StoppedFound(frozenset(self._session.out_of_reach())))
 
     # Batches of this replica
 
     def _publish(self, effect: effects.Publish) -> None:
         message = add_header(self._session.zid, effect.number, encode(effect.batch))
         put = partial(self._put, effect, message)
-        if len(message) <= _LARGE and not effect.patient:
+        if len(message) > _LARGE:
+            put = partial(self._send_large, effect.number, put)
+        elif not effect.patient:
             put()
-        else:
-            # If the workers are busy, the replicas get the write when they compare.
-            self._senders.offer(put)
+            return
+        # If the workers are busy, the replicas get the write when they compare.
+        self._senders.offer(put)
+
+    def _send_large(self, number: int, send: Callable[[], object]) -> None:
+        """Send a large batch, and report all the while that it is being sent."""
+        sent = threading.Event()
+        beat_until(sent, lambda: self._runner.run(events.Progressed(number)))
+        try:
+            send()
+        finally:
+            sent.set()
 
     def _put(self, effect: effects.Publish, message: bytes) -> None:
         publisher = self._publisher or self._begin()
-        if self._keys.scoped:
-            key = self._keys.scope(self._keys.scoped_change(), effect.paths)
-            self._session.put(key, message)
+        scoped, large = self._keys.scoped, len(message) > _LARGE
+        if scoped or large:
+            key = self._keys.change
+            if scoped:
+                key = self._keys.scope(self._keys.scoped_change(), effect.paths)
+            # Reports of progress must not wait behind a large batch.
+            self._session.put(key, message, priority="background" if large else "normal")
         else:
             publisher.put(message)
 
@@ -180,8 +187,12 @@ class Exchange:
         for zid in effect.zids:
             key = self._keys.scope(self._keys.of(zid, "write"), effect.paths)
             handle = partial(self._on_resend_reply, zid, effect.number)
-            query = partial(self._session.get_async, key, handle, lambda: None)
-            self._senders.offer(partial(query, payload=message, timeout=effect.timeout))
+            query = partial(self._session.get_async, key, handle, lambda: None, payload=message)
+            if len(message) > _LARGE:  # a reply counts however late it comes
+                query = partial(query, timeout=LONGEST_WAIT)
+                self._senders.offer(partial(self._send_large, effect.number, query))
+            else:
+                self._senders.offer(partial(query, timeout=effect.timeout))
 
     def _on_resend_reply(self, zid: str, number: int, reply: Reply) -> None:
         if reply.ok:
@@ -196,6 +207,9 @@ class Exchange:
             self._runner.run_soon(
                 events.Acknowledged(zid.decode(), number, reason.decode(errors="replace"))
             )
+        elif zid[:1] == _AT_WORK and zid[1:].isalnum():
+            number = _ACK.unpack_from(payload)[0]
+            self._runner.run_soon(events.Progressed(number, zid[1:].decode()))
 
     # Batches of others
 
@@ -204,12 +218,15 @@ class Exchange:
         message = sample.payload
         try:
             reach = self._keys.change_reach(sample.key)
-            sender, number, _ = read_header(message)
             if len(message) > _LARGE:
+                sender, number, _ = read_header(message)
+                receive = partial(self._receive_large, sender, number, message, sample.key)
                 # If the worker is busy, it is not acknowledged, and so sent once more.
-                self._runner.worker.offer(partial(self._receive, message, sample.key))
-            elif self._runner.defer(message, reach):
-                self._acknowledge(effects.Acknowledge(sender, number))
+                self._begin_work(sender, number)
+                if not self._runner.worker.offer(receive):
+                    self._end_work(sender, number)
+            elif deferred := self._runner.defer(message, reach):
+                self._acknowledge(effects.Acknowledge(*deferred))
             else:
                 self._runner.receive(message, reach)
         except DecodeError as error:
@@ -222,13 +239,35 @@ class Exchange:
         # If the worker is busy, comparing finds the write.
         self._runner.worker.offer(partial(self._receive, message, key))
 
-    def _receive(self, message: bytes, key: str) -> None:
+    def _receive(self, message: bytes, key: str) -> bool:
+        """Apply a message; return whether it was a batch."""
         try:
             self._runner.run(self._runner.read_batch(message, self._keys.change_reach(key)))
         except DecodeError as error:
             self._runner.report(NOT_A_PARAMETER, error)
+            return False
+        return True
+
+    def _receive_large(self, sender: str, number: int, message: bytes, key: str) -> None:
+        if not self._receive(message, key):
+            self._end_work(sender, number)
+
+    def _begin_work(self, sender: str, number: int) -> None:
+        """Report to the writer of a large batch that this replica works on it, until it is done."""
+        ended = threading.Event()
+        is_free = len(self._at_work) < _MOST_AT_WORK
+        if is_free and self._at_work.setdefault((sender, number), ended) is ended:
+            key, note = self._keys.ack(sender), _ACK.pack(number) + _AT_WORK + self._own
+            beat_until(ended, lambda: _send(lambda: self._session.put(key, note, block=False)))
+
+    def _end_work(self, sender: str, number: int) -> None:
+        ended = self._at_work.pop((sender, number), None)
+        if ended is not None:
+            ended.set()
 
     def _acknowledge(self, effect: effects.Acknowledge) -> None:
+        if self._at_work:
+            self._end_work(effect.sender, effect.number)
         if effect.query:
             query = self._queries.pop(effect.query, None)
             if query is not None:
@@ -302,40 +341,36 @@ class Exchange:
             failed = True
         self._runner.run(events.QueryEnded(number, reply, failed))
 
-    def _on_query(self, handle: Callable[[Query], None], query: Query) -> None:
-        if not self._runner.worker.offer(partial(self._handle, handle, query)):
+    def _on_query(self, purpose: Purpose, query: Query) -> None:
+        if not self._runner.worker.offer(partial(self._handle, purpose, query)):
             with query:
                 query.reply_error(_BUSY)
 
-    def _handle(self, handle: Callable[[Query], None], query: Query) -> None:
+    def _handle(self, purpose: Purpose, query: Query) -> None:
+        number = next(self._numbers)
         try:
-            handle(query)
+            event = self._read_query(purpose, query, number)
         except DecodeError as error:
             self._runner.report(_DAMAGED_QUERY, error)
             with query:
                 query.reply_error(str(error))
-
-    def _on_resent(self, query: Query) -> None:
-        reach = self._keys.reach(query.key, self._keys.of(self._session.zid, "write"))
-        number = next(self._numbers)
-        event = self._runner.read_batch(query.payload or b"", reach, number)
-        if isinstance(event, events.MemberLeft):
-            raise DecodeError("parameter batch", 0, "a departure, expected writes")
+            return
         self._queries[number] = query
         self._runner.run(event)
 
-    def _on_sync(self, query: Query) -> None:
-        request = decode(query.payload or b"", SyncRequest)
-        number = next(self._numbers)
-        self._queries[number] = query
-        self._runner.run(events.SyncReceived(number, request))
-
-    def _on_writes(self, query: Query) -> None:
-        reach = self._keys.reach(query.key, self._keys.of(self._session.zid, "tell"))
-        request = decode(query.payload or b"", SyncRequest)
-        number = next(self._numbers)
-        self._queries[number] = query
-        self._runner.run(events.WritesReceived(number, request, reach))
+    def _read_query(self, purpose: Purpose, query: Query, number: int) -> events.Event:
+        message = query.payload or b""
+        if purpose == "sync":
+            return events.SyncReceived(number, decode(message, SyncRequest))
+        reach = self._keys.reach(query.key, self._keys.of(self._session.zid, purpose))
+        if purpose == "tell":
+            return events.WritesReceived(number, decode(message, SyncRequest), reach)
+        batch = self._runner.read_batch(message, reach, number)
+        if isinstance(batch, events.MemberLeft):
+            raise DecodeError("parameter batch", 0, "a departure, expected writes")
+        if len(message) > _LARGE:
+            self._begin_work(batch.sender, batch.number)
+        return batch
 
     def _reply(self, effect: effects.Reply) -> None:
         query = self._queries.pop(effect.query, None)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Final, TypeVar, overload
+from typing import Any, Final, Protocol, TypeVar, overload
 
 from rosz.params.paths import Path, climb, joined, resolve, split
 from rosz.params.replica.reader import not_found
 from rosz.params.replica.replica import ACK_TIMEOUT, Replica
 from rosz.params.replica.watch import Changed, Watch
-from rosz.params.tree import MISSING
-from rosz.params.values import convert, copy, normalise
-from rosz.params.writes import Change, condense
+from rosz.params.tree import MISSING, Missing
+from rosz.params.values import Value, convert, copy, normalise
+from rosz.params.writes import DELETED, Change, condense
 
 T = TypeVar("T")
 D = TypeVar("D")
@@ -22,11 +22,34 @@ _MAX_CACHED: Final = 10_000
 """Names whose paths are cached; when there are more, the cache is cleared."""
 
 
+class RemoteNode(Protocol):
+    """A node that keeps its parameters itself."""
+
+    def get(self, path: Path) -> Value | Missing:
+        """Return the value at a path; `MISSING` if there is none."""
+
+    def write(self, changes: list[Change]) -> None:
+        """Make changes; a dict keeps what is beside it."""
+
+
+class RemoteNodes(Protocol):
+    """The nodes that keep their parameters themselves, as those of ROS 2 do."""
+
+    def listen(self, changed: Callable[[], None]) -> None:
+        """Call a function whenever such a node appears or disappears."""
+
+    def owner(self, path: Path) -> RemoteNode | None:
+        """Return the node that a path belongs to."""
+
+
 class Params:
     """The parameter store as seen by a node, much like a dict that is shared with all other nodes.
 
     Reading is a look-up in the memory of the process. Writing returns when all other processes that
     hold the store have applied the write. Safe for threads, and for use in any callback.
+
+    A name below that of a node of ROS 2 is read and written by calling that node. Such calls raise
+    `WaitTimeout` after 5 s; `names`, `search`, `watch` and namespaces above do not reach it.
 
     Args:
         replica: The process's copy of the store.
@@ -42,6 +65,12 @@ class Params:
         self._remaps = dict(remaps or {})
         self._origin = f"{node} ({replica.label})"
         self._paths: dict[str, Path] = {}
+        self._remote: RemoteNodes | None = None
+
+    def reach(self, remote: RemoteNodes) -> None:
+        """Read and write the parameters of such nodes by calls to them from now on."""
+        self._remote = remote
+        remote.listen(self._paths.clear)
 
     def resolve(self, name: str) -> str:
         """Return the global name that a name means for this node.
@@ -71,8 +100,10 @@ class Params:
             ParamNotFound: The parameter is not set, and there is no default; also a ``KeyError``.
             ParamError: The value has another type; the message names its writer.
         """
-        path = self._path(name)
-        value = self._replica.lookup(path)
+        path, owner = self._place(name)
+        value = MISSING if owner is None else owner.get(path)
+        if value is MISSING:
+            value = self._replica.lookup(path)
         if value is MISSING:
             if default is not MISSING:
                 return default
@@ -82,7 +113,11 @@ class Params:
         return copy(value)
 
     def __getitem__(self, name: str) -> Any:
-        path = self._paths.get(name) or self._path(name)
+        path = self._paths.get(name)
+        if path is None:
+            path, owner = self._place(name)
+            if owner is not None:
+                return self.get(name)
         node: Any = self._replica.root
         try:
             for part in path:
@@ -105,7 +140,11 @@ class Params:
             PartlyWritten: It is set, but a replica refuses it or cannot store it.
             ClosedError: The node is shut down.
         """
-        self._replica.set(self._path(name), value, origin=self._origin, timeout=timeout)
+        path, owner = self._place(name)
+        if owner is None:
+            self._replica.set(path, value, origin=self._origin, timeout=timeout)
+        else:
+            owner.write([(path, normalise(value, joined(path)))])
 
     def __setitem__(self, name: str, value: object) -> None:
         self.set(name, value)
@@ -123,11 +162,15 @@ class Params:
             PartlyWritten: They are set, but a replica refuses them or cannot store them.
             ClosedError: The node is shut down.
         """
-        changes: list[Change] = []
+        changes: dict[RemoteNode | None, list[Change]] = {None: []}
         for name, value in values.items():
-            path = self._path(name)
-            changes.append((path, normalise(value, joined(path))))
-        self._replica.write(condense(changes), origin=self._origin, timeout=timeout)
+            path, owner = self._place(name)
+            changes.setdefault(owner, []).append((path, normalise(value, joined(path))))
+        stored = condense(changes.pop(None))
+        for owner, own in changes.items():
+            if owner is not None:
+                owner.write(own)
+        self._replica.write(stored, origin=self._origin, timeout=timeout)
 
     def delete(self, name: str, *, timeout: float = ACK_TIMEOUT) -> None:
         """Delete a parameter and everything below it; its parent stays, even if empty.
@@ -138,14 +181,19 @@ class Params:
             PartlyWritten: It is deleted, but a replica refuses that or cannot store it.
             ClosedError: The node is shut down.
         """
-        self._replica.delete(self._path(name), origin=self._origin, timeout=timeout)
+        path, owner = self._place(name)
+        if owner is None:
+            self._replica.delete(path, origin=self._origin, timeout=timeout)
+        else:
+            owner.write([(path, DELETED)])
 
     def __delitem__(self, name: str) -> None:
         self.delete(name)
 
     def has(self, name: str) -> bool:
         """Tell whether a parameter, or anything below the name, is set."""
-        return self._replica.has(self._path(name))
+        path, owner = self._place(name)
+        return self._replica.has(path) or (owner is not None and owner.get(path) is not MISSING)
 
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and self.has(name)
@@ -199,10 +247,18 @@ class Params:
         return f"<Params of {self._node}>"
 
     def _path(self, name: str) -> Path:
+        return self._paths.get(name) or split(self.resolve(name))
+
+    def _place(self, name: str) -> tuple[Path, RemoteNode | None]:
+        """Return the path of a name, and the remote node that it belongs to."""
         path = self._paths.get(name)
-        if path is None:
-            path = split(self.resolve(name))
-            if len(self._paths) >= _MAX_CACHED:
-                self._paths.clear()
-            self._paths[name] = path
-        return path
+        if path is not None:
+            return path, None
+        path = split(self.resolve(name))
+        if len(self._paths) >= _MAX_CACHED:
+            self._paths.clear()
+        self._paths[name] = path  # before the look at nodes: one that appears now clears the cache
+        owner = None if self._remote is None else self._remote.owner(path)
+        if owner is not None:
+            self._paths.pop(name, None)
+        return path, owner

@@ -22,7 +22,7 @@ from rosz.errors import NoReplica, ParamError, RoszError
 from rosz.lifecycle import Closing, Lifecycle
 from rosz.params.paths import Path, joined, to_path
 from rosz.params.replica.core import Config, ReplicaCore
-from rosz.params.replica.core.effects import Effect, Outcome, ReadStorages, SeedsChanged
+from rosz.params.replica.core.effects import Outcome, ReadStorages, SeedsChanged
 from rosz.params.replica.core.events import (
     CloseCalled,
     CompareCalled,
@@ -85,17 +85,12 @@ class _Copy(TreeReader, Closing):
         self._keys = Keys(domain, scoped=session.secured)
         self._exchange = Exchange(session, self._keys, self._runner)
         self._tokens = Tokens(session, self._keys, self._runner)
-        self._runner.carry_out = self._carry_out
 
     def close(self) -> None:
         """Leave the other copies; a second call has no effect."""
         self._tokens.close()
         self._exchange.close()
         self._runner.close()
-
-    def _carry_out(self, effect: Effect) -> None:
-        self._exchange.carry_out(effect)
-        self._tokens.carry_out(effect)
 
 
 class Replica(_Copy):
@@ -143,6 +138,8 @@ class Replica(_Copy):
         self._load(handover)
         self._parameter_keys = ParameterKeys(session, self._keys, self._runner)
         self._runner.on_own_change = self._parameter_keys.publish
+        self._runner.handlers[ReadStorages] = self._read_storages
+        self._runner.handlers[SeedsChanged] = self._serve_parameter_keys
         self._exchange.serve()
         self._server = ClientServer(session, self._keys, self._runner, self.write)
         if settled is not None:
@@ -198,6 +195,7 @@ class Replica(_Copy):
         origin: str = "",
         stamp: Stamp | None = None,
         timeout: float = ACK_TIMEOUT,
+        by_progress: bool = False,
     ) -> Outcome:
         """Write a batch, which every replica applies as one change.
 
@@ -207,6 +205,8 @@ class Replica(_Copy):
             origin: Writer, as shown to users; this process by default.
             stamp: Stamp of the batch; a new one by default.
             timeout: Time limit in seconds of the wait for the other replicas.
+            by_progress: Whether the time counts from the last progress: the batch is being sent, or
+                a replica works on it or has acknowledged it.
 
         Raises:
             ParamError: The tree cannot hold a change; nothing is changed then.
@@ -223,9 +223,10 @@ class Replica(_Copy):
             return Outcome(0)
         origin = origin or self.label
         given = None if stamp is None else (stamp.time, stamp.id)
+        is_given = given is not None
         outcome: Outcome = self._runner.call(
             lambda call, now: WriteCalled(
-                call, batch, origin, given or (now.time, now.id), given is not None, timeout
+                call, batch, origin, given or (now.time, now.id), is_given, timeout, by_progress
             )
         )
         return outcome
@@ -289,16 +290,6 @@ class Replica(_Copy):
         state = "closed" if self.closed else f"{len(self._runner.core.zids)} others"
         return f"<Replica of {len(self._runner)} writes, {state}>"
 
-    def _carry_out(self, effect: Effect) -> None:
-        match effect:
-            case ReadStorages():
-                if not lend_thread(self._read_storages):
-                    self._read_storages()
-            case SeedsChanged():
-                self._runner.worker.submit(self._serve_parameter_keys)
-            case _:
-                super()._carry_out(effect)
-
     def _load(self, handover: bytes) -> None:
         """Load the writes of before."""
         if handover:
@@ -308,13 +299,18 @@ class Replica(_Copy):
         elif self._storage is not None:
             self._runner.run(Loaded(*self._storage.load()))
 
-    def _read_storages(self) -> None:
-        self._runner.run(StoragesRead(self._parameter_keys.load()))
+    def _read_storages(self, _: ReadStorages) -> None:
+        def read() -> None:
+            self._runner.run(StoragesRead(self._parameter_keys.load()))
 
-    def _serve_parameter_keys(self) -> None:
+        if not lend_thread(read):
+            read()
+
+    def _serve_parameter_keys(self, _: SeedsChanged) -> None:
         # Rules may keep replies of replicas on other machines away from this one.
-        core = self._runner.core
-        self._parameter_keys.serve(lambda: self._keys.scoped or core.is_oldest_seed)
+        scoped, core = self._keys.scoped, self._runner.core
+        serve = self._parameter_keys.serve
+        self._runner.worker.submit(lambda: serve(lambda: scoped or core.is_oldest_seed))
 
     def _tick(self) -> None:
         """Compare other programs' storages with the tree from time to time, if this is to do so."""

@@ -1,8 +1,8 @@
 """Running the core of a copy of the store: one step at a time, on any thread.
 
-A step is made under a lock. Effects that concern this process alone are carried out under it as
-well, and therefore in the order of the steps: readers see the new tree, watchers are notified,
-calls return, timers start, writes go to the file. All others are carried out after it.
+A step is made under a lock. Some effects are carried out under it as well, and therefore in the
+order of the steps: readers see the new tree, watchers are notified, calls return, writes go to the
+file. All others are carried out after it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, Final
 
-from rosz.errors import ClosedError, DecodeError, ParamError
+from rosz.errors import ClosedError, DecodeError, ParamError, RoszError
 from rosz.params.history import History
 from rosz.params.paths import ROOT, Path
 from rosz.params.replica.core import ReplicaCore
@@ -45,7 +45,7 @@ from rosz.params.replica.watch import Callback, Watch, Watchers
 from rosz.params.tree import Tree
 from rosz.params.wire import Departure, decode, read_header, read_time
 from rosz.session import HybridClock, Stamp
-from rosz.worker import Worker
+from rosz.worker import Worker, lend_thread
 
 _log = logging.getLogger("rosz.params")
 _CLOCK: Final = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
@@ -55,15 +55,29 @@ _LOCK_TIMEOUT: Final = 0.002
 """Seconds that a thread of Zenoh waits for the lock before it leaves an event to the worker."""
 
 _MAX_DEFERRED: Final = 64
-"""Messages that may be deferred, which bounds the work that a read has to do before it returns."""
+"""Largest number of deferred messages, which a read has to apply before it returns."""
 
 _MAX_WAITING: Final = 2000
 """Tasks of the worker above which requests from the network are refused."""
+
+_BEAT: Final = 0.1
+"""Seconds between two reports of progress. The sender repeats a batch without any for longer."""
 
 _INTERRUPTED: Final = (
     "a signal handler interrupted its thread during a change of the parameters, and cannot do one"
     " itself; start a thread from it that does"
 )
+
+
+def beat_until(ended: threading.Event, beat: Callable[[], object]) -> None:
+    """Call a function about ten times a second, on another thread, until an event is set."""
+
+    def run() -> None:
+        beat()
+        while not ended.wait(_BEAT):
+            beat()
+
+    lend_thread(run)
 
 
 def _run(task: Callable[[], object]) -> None:
@@ -74,7 +88,7 @@ def _run(task: Callable[[], object]) -> None:
 
 
 class _PendingCall:
-    """A call of the process that the core has not answered yet; it waits for its own timer."""
+    """A call of the process that the core has not answered yet; its thread makes its timer fire."""
 
     __slots__ = ("answered", "due", "result", "timer")
 
@@ -118,9 +132,9 @@ class CoreRunner:
         storage: What keeps the writes, if anything does.
 
     Attributes:
-        worker: Worker for what no other thread does.
+        worker: Worker for timers, and for events that no thread of Zenoh waits to handle.
         watchers: Callbacks that are notified of changes.
-        carry_out: Function that carries out the effects that concern other processes.
+        handlers: Function that carries out an effect after the step, for each type of them.
         on_own_change: Function called with changes that this process made.
     """
 
@@ -131,31 +145,31 @@ class CoreRunner:
             "rosz-params", _run, capacity=_MAX_WAITING, logger=_log
         )
         self.watchers: Watchers = Watchers()
-        self.carry_out: Callable[[Effect], object] = bool
-        self.on_own_change: Callable[[TreeChanged], object] = bool
+        self.handlers: dict[type[Effect], Callable[[Any], object]] = {
+            Log: self._log,
+            StartTimer: self._start_timer,
+        }
+        self.on_own_change: Callable[[TreeChanged], object] = lambda _: None
         self._core = core
         self._clock = clock
-        self._storage = storage
         self._root: Tree = {}
         self._lock = threading.RLock()
         self._holder = 0
         self._deferred: deque[tuple[bytes, Path]] = deque()
         self._applying = False
-        self._follows = storage is not None or core.config.listens
-        self._left: list[Effect] = []
+        self._apply_at_once = storage is not None or core.config.listens
+        self._later_effects: list[Effect] = []
         self._numbers = itertools.count(1)
         self._calls: dict[int, _PendingCall] = {}
         self._logged: set[str] = set()
         self._closed = False
-        self._local: dict[type[Effect], Callable[[Any], object]] = {
+        self._under_lock: dict[type[Effect], Callable[[Any], object]] = {
             TreeChanged: self._show,
             Answer: self._answer,
-            StartTimer: self._start_timer,
-            Save: self._save,
-            Compact: self._save,
         }
         if storage is not None:
             storage.on_saved = self.run
+            self._under_lock |= {Save: storage.save, Compact: storage.save}
 
     def __enter__(self) -> History:
         self._acquire()
@@ -175,14 +189,14 @@ class CoreRunner:
 
     @property
     def root(self) -> Tree:
-        """The tree now; never changed in place."""
+        """The tree, after deferred messages are applied; never changed in place."""
         # One of the two is always true until the last deferred message has been applied.
         if self._deferred or self._applying:
             self.apply_deferred()
         return self._root
 
     def apply_deferred(self) -> None:
-        """Apply deferred messages, unless this thread is at work on the history already."""
+        """Apply deferred messages, unless this thread holds the lock already."""
         if self._holder != threading.get_ident():
             with self:
                 pass
@@ -210,7 +224,7 @@ class CoreRunner:
         return True
 
     def run_soon(self, event: Event) -> None:
-        """Make a step now if no other thread makes one, else on the worker."""
+        """Make a step now if the lock is soon free, else on the worker."""
         if not self.run(event, _LOCK_TIMEOUT):
             self.worker.submit(partial(self.run, event))
 
@@ -230,23 +244,26 @@ class CoreRunner:
             try:
                 if self._closed:
                     raise ClosedError("the copy of the parameter store is closed")
-                effects = self._step(make(number, self._now()))
+                # The core moves the stamp behind all writes that it has seen.
+                effects = self._step(make(number, self._clock.now()))
             finally:
                 self._release()
             self._carry_out(effects)
             while timer := pending.wait():
                 self.run(TimerFired(timer))
-        finally:
-            del self._calls[number]
-            if pending.timer is not None:  # interrupted: the core ends it even so
+        except BaseException:
+            if pending.timer is not None:  # interrupted: its timer ends the call in the core
                 event = TimerFired(pending.timer)
                 self.worker.later(max(0.0, pending.seconds_left()), partial(self.run, event))
+            raise
+        finally:
+            del self._calls[number]
         if isinstance(pending.result, Exception):
             raise pending.result
         return pending.result
 
     def receive(self, message: bytes, reach: Path) -> None:
-        """Take a message of another replica on ``change``: apply it now, later, or defer it.
+        """Apply a message of another replica now or on the worker; drop it if the worker is full.
 
         Args:
             message: Message with its header.
@@ -258,7 +275,7 @@ class CoreRunner:
         event = self.read_batch(message, reach)
         if isinstance(event, MemberLeft) or not self.worker.full:
             self.run_soon(event)
-        # If the worker is busy, the batch is not acknowledged, and so sent once more.
+        # A dropped batch is not acknowledged, so the sender repeats it.
 
     def read_batch(
         self, message: bytes, reach: Path, query: int = 0, *, acknowledged: bool = False
@@ -274,25 +291,32 @@ class CoreRunner:
             return MemberLeft(sender, returns=batch.kind == Departure.RESTARTS)
         return BatchReceived(sender, number, batch, reach, query, acknowledged)
 
-    def defer(self, message: bytes, reach: Path = ROOT) -> bool:
+    def defer(self, message: bytes, reach: Path = ROOT) -> tuple[str, int] | None:
         """Queue a message of another replica, to be applied by the next read.
 
         Returns:
-            Whether that is enough; if not, the message must be applied now, because somebody is to
-            be notified of it, too many messages are deferred, or it may have to be refused.
+            The sender and the number of the message if it was deferred. None if the caller must
+            apply it now: somebody is to be notified of it, too many messages are deferred, it is
+            not a batch, or its time may be a reason to refuse it.
         """
-        if self._is_followed() or len(self._deferred) >= _MAX_DEFERRED:
-            return False
-        if not self._is_plausible(message):
-            return False
+        if self._must_apply_at_once() or len(self._deferred) >= _MAX_DEFERRED:
+            return None
+        try:
+            sender, number, start = read_header(message)
+            written_at = read_time(memoryview(message)[start:])
+        except DecodeError:
+            return None
+        if not number or not self._core.may_defer(written_at, time.time_ns()):
+            return None
         self._deferred.append((message, reach))
-        # Somebody may have begun to follow after the first check, and seen the queue without this.
-        return not self._is_followed()
+        # A watcher that was added after the first check would miss this message.
+        return None if self._must_apply_at_once() else (sender, number)
 
     def stamp(self) -> Stamp:
         """Return a stamp that is later than all writes seen."""
-        with self:
-            return self._now()
+        with self as history:
+            self._clock.observe(Stamp(history.latest, ""))
+            return self._clock.now()
 
     def watch(self, path: Path, callback: Callback) -> Watch:
         """Call a function on all changes of a path from now on."""
@@ -302,12 +326,12 @@ class CoreRunner:
     @contextmanager
     def frozen(self) -> Iterator[History]:
         """Return a context in which no step is made, and which gets the history."""
-        before, self._follows = self._follows, True  # a deferred message would be acknowledged
+        before, self._apply_at_once = self._apply_at_once, True  # to defer is to acknowledge
         try:
             with self as history:
                 yield history
         finally:
-            self._follows = before
+            self._apply_at_once = before
 
     def report(self, what: str, error: DecodeError) -> None:
         """Log damaged bytes, once for each kind."""
@@ -320,38 +344,41 @@ class CoreRunner:
         self.watchers.close()
 
     def _step(self, event: Event) -> list[Effect]:
-        """Make a step under the lock; return the effects that are left to do after it."""
+        """Make a step under the lock; return the effects to carry out after its release."""
         if self._closed:
             return []
         moment = Moment(time.clock_gettime(_CLOCK), time.time_ns())
-        left: list[Effect] = []
+        remaining: list[Effect] = []
         for effect in self._core.step(event, moment):
-            carry_out = self._local.get(type(effect))
+            carry_out = self._under_lock.get(type(effect))
             if carry_out is None:
-                left.append(effect)
+                remaining.append(effect)
             else:
                 carry_out(effect)
-        return left
+        return remaining
 
     def _carry_out(self, effects: list[Effect]) -> None:
         for effect in effects:
-            if type(effect) is Log:
-                self._log(effect)
-            else:
-                self.carry_out(effect)
+            carry_out = self.handlers.get(type(effect))
+            if carry_out is not None:
+                try:
+                    carry_out(effect)
+                except RoszError as error:
+                    _log.debug("%s is not done: %s", type(effect).__name__, error)
 
     def _acquire(self, timeout: float = -1) -> bool:
-        """Lock the core and apply deferred messages; return false if the time was over.
+        """Lock the core and apply deferred messages; return False at the time limit.
 
         Raises:
             ParamError: This thread holds the lock already, below a signal handler.
         """
         if not self._lock.acquire(timeout=timeout):
             return False
-        if self._holder == threading.get_ident():
+        thread = threading.get_ident()
+        if self._holder == thread:
             self._lock.release()
             raise ParamError(_INTERRUPTED)
-        self._holder = threading.get_ident()
+        self._holder = thread
         try:
             if self._deferred:
                 self._applying = True
@@ -365,33 +392,22 @@ class CoreRunner:
         return True
 
     def _release(self) -> None:
-        left, self._left = self._left, []
+        effects = self._later_effects
+        if effects:
+            self._later_effects = []
         self._holder = 0
         self._lock.release()
-        self._carry_out(left)
+        self._carry_out(effects)
 
     def _apply(self, message: bytes, reach: Path) -> None:
         """Apply a deferred message."""
         try:
-            self._left += self._step(self.read_batch(message, reach, acknowledged=True))
+            self._later_effects += self._step(self.read_batch(message, reach, acknowledged=True))
         except DecodeError as error:
-            self._left.append(damage(NOT_A_PARAMETER, error))
+            self._later_effects.append(damage(NOT_A_PARAMETER, error))
 
-    def _is_followed(self) -> bool:
-        return self._follows or self.watchers.active
-
-    def _is_plausible(self, message: bytes) -> bool:
-        """Tell whether a message is a batch that is not to be refused for its time."""
-        try:
-            _, number, start = read_header(message)
-            moment = read_time(memoryview(message)[start:])
-        except DecodeError:
-            return False
-        return number > 0 and self._core.may_defer(moment, time.time_ns())
-
-    def _now(self) -> Stamp:
-        self._clock.observe(Stamp(self._core.history.latest, ""))
-        return self._clock.now()
+    def _must_apply_at_once(self) -> bool:
+        return self._apply_at_once or self.watchers.active
 
     def _show(self, change: TreeChanged) -> None:
         """Show the new tree to readers, and notify everybody of the writes that changed it."""
@@ -403,7 +419,7 @@ class CoreRunner:
     def _answer(self, answer: Answer) -> None:
         pending = self._calls.get(answer.call)
         if pending is not None:
-            pending.result, pending.timer = answer.result, None
+            pending.result = answer.result
             pending.answered.release()
 
     def _start_timer(self, effect: StartTimer) -> None:
@@ -413,10 +429,6 @@ class CoreRunner:
             pending.due = time.clock_gettime(_CLOCK) + effect.seconds
         else:
             self.worker.later(effect.seconds, partial(self.run, TimerFired(effect.timer)))
-
-    def _save(self, effect: Save | Compact) -> None:
-        if self._storage is not None:
-            self._storage.save(effect)
 
     def _log(self, line: Log) -> None:
         if line.once not in self._logged:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -23,10 +24,11 @@ from rosz.lifecycle import Closable
 from rosz.params.paths import Path, split
 from rosz.params.replica.core.effects import TreeChanged
 from rosz.params.replica.reader import TreeReader, names_beside
-from rosz.params.replica.runner import CoreRunner
+from rosz.params.replica.runner import CoreRunner, beat_until
 from rosz.params.tree import MISSING, lookup
 from rosz.params.values import Value
 from rosz.params.wire import (
+    Batch,
     ClientReply,
     ClientRequest,
     Keys,
@@ -123,10 +125,22 @@ class ClientServer:
             _reply(query, ClientReply("joining"))
 
     def _finish_write(self, query: Query, request: ClientRequest, reach: Path) -> None:
+        ended = threading.Event()
+        if request.beats:
+            beat_until(ended, partial(self._report_progress, query, request.batch))
         try:
-            _reply(query, self._try(partial(self._write, reach), request))
+            reply = self._try(partial(self._write, reach), request)
         finally:
+            ended.set()
             self._slots.release()
+        _reply(query, reply)
+
+    def _report_progress(self, query: Query, batch: Batch | None) -> None:
+        if batch is not None:
+            holders, waiting = self._state.core.progress((batch.time, batch.clock))
+            reply = ClientReply("working", holders=holders, slow=waiting)
+            with suppress(RoszError):  # the last reply has closed the query meanwhile
+                query.reply(query.key, encode(reply))
 
     def _try(
         self, verb: Callable[[ClientRequest], ClientReply], request: ClientRequest
@@ -166,7 +180,8 @@ class ClientServer:
         check_reach((path for path, _ in changes), reach)
         stamp = Stamp(batch.time, batch.clock)
         timeout = min(request.timeout, _MAX_TIMEOUT)
-        outcome = self._write_batch(changes, origin=batch.origin, stamp=stamp, timeout=timeout)
+        how: Any = {"origin": batch.origin, "stamp": stamp, "by_progress": request.beats}
+        outcome = self._write_batch(changes, timeout=timeout, **how)
         return ClientReply(slow=list(outcome.slow), holders=outcome.holders)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -14,8 +13,6 @@ from rosz.params.replica.core import effects, events
 from rosz.params.replica.runner import CoreRunner
 from rosz.params.wire import Keys
 from rosz.session import Session
-
-_log = logging.getLogger("rosz.params")
 
 
 class Tokens:
@@ -38,12 +35,12 @@ class Tokens:
         self._seed_watch: Closable | None = None
         self._lock = threading.RLock()
         self._closed = False
-        self._handlers: dict[type[effects.Effect], Callable[[Any], object]] = {
-            effects.DeclareToken: self._declare_token,
-            effects.DeclareSeed: self._declare_seed,
-            effects.UndeclareSeed: self._undeclare_seed,
-            effects.FollowAll: self._follow_all,
-            effects.UnfollowAll: self._unfollow_all,
+        runner.handlers |= {
+            effects.DeclareToken: partial(self._submit, self._declare_token),
+            effects.DeclareSeed: partial(self._submit, self._declare_seed),
+            effects.UndeclareSeed: partial(self._submit, self._undeclare_seed),
+            effects.FollowAll: partial(self._submit, self._follow_all),
+            effects.UnfollowAll: partial(self._submit, self._unfollow_all),
         }
 
     def follow_seeds(self, timeout: float) -> None:
@@ -56,14 +53,9 @@ class Tokens:
             ClosedError: The session is closed.
         """
         complete = threading.Event()
-        self._seed_watch = self._session.watch_tokens(self._keys.seeds, self._on_seed, complete.set)
+        on_token = partial(self._on_token, None)
+        self._seed_watch = self._session.watch_tokens(self._keys.seeds, on_token, complete.set)
         complete.wait(timeout)
-
-    def carry_out(self, effect: effects.Effect) -> None:
-        """Carry out an effect, on the worker."""
-        handle = self._handlers.get(type(effect))
-        if handle is not None:
-            self._runner.worker.submit(partial(self._unless_closed, handle, effect))
 
     def close(self) -> None:
         """Undeclare everything; a second call has no effect."""
@@ -72,6 +64,9 @@ class Tokens:
         for declared in (self._token, self._seed_token, self._seed_watch, self._watch):
             if declared is not None:
                 declared.close()
+
+    def _submit(self, handle: Callable[[Any], object], effect: effects.Effect) -> None:
+        self._runner.worker.submit(partial(self._unless_closed, handle, effect))
 
     def _unless_closed(self, handle: Callable[[Any], object], effect: effects.Effect) -> None:
         with self._lock:
@@ -107,22 +102,18 @@ class Tokens:
         if watch is not None:
             watch.close()
 
-    def _on_seed(self, token: str, alive: bool) -> None:  # a callback
+    def _on_token(self, watch: int | None, token: str, alive: bool) -> None:  # a callback
+        """Report a token of a replica that is followed, or of a seed without a number."""
         try:
             member = self._keys.member(token)
         except DecodeError as error:
-            _log.warning("%s", error)
+            self._runner.report("a token is not that of a replica", error)
             return
-        if member.zid != self._session.zid:
+        if member.zid == self._session.zid:
+            return
+        if watch is None:
             self._runner.run(events.SeedCame(member) if alive else events.SeedWent(member.zid))
-
-    def _on_token(self, watch: int, token: str, alive: bool) -> None:  # a callback
-        try:
-            member = self._keys.member(token)
-        except DecodeError as error:
-            _log.warning("%s", error)
-            return
-        if member.zid != self._session.zid:
+        else:
             self._runner.run(
                 events.MemberCame(watch, member) if alive else events.MemberWent(watch, member.zid)
             )

@@ -5,17 +5,13 @@ from __future__ import annotations
 import select
 import socket
 import sys
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rosz.errors import ClosedError
 from rosz.node import Node, serve_loggers
-from rosz.programs.rosserial.link import (
-    DevicePort,
-    Link,
-    MissingSerial,
-    SocketPort,
-    open_serial,
-)
+from rosz.programs.rosserial.link import DevicePort, Link, MissingSerial, SocketPort, open_serial
 from rosz.remap import parse
 from rosz.worker import Worker
 
@@ -47,22 +43,32 @@ class TcpServer:
     def listen(self) -> None:
         """Serve the devices that connect, until the node ends."""
         self._node.log.info("Waiting for socket connections on port %d", self.port)
-        workers: Worker[Any] = Worker("rosz-rosserial-tcp", threads=_DEVICES)
+        workers = Worker[Any]("rosz-serial", threads=_DEVICES, capacity=_DEVICES, size=lambda _: 1)
         try:
             while not self._node.is_shutdown:
                 if select.select([self._socket], [], [], _ACCEPT_SECONDS)[0]:
-                    connection, address = self._socket.accept()
-                    self._node.log.info("Established a socket connection from %s:%d", *address[:2])
-                    where = f"{address[0]}:{address[1]}"
-                    workers.submit(lambda c=connection, w=where: self._serve(SocketPort(c), w))
+                    self._accept(workers)
         finally:
             self._socket.close()
             workers.close()
 
+    def _accept(self, workers: Worker[Any]) -> None:
+        try:
+            connection, address = self._socket.accept()
+        except OSError as error:  # the device has gone, or there are too many open files
+            self._node.log.warning("cannot accept a connection: %s", error)
+            self._node.context.wait_for_shutdown(_RETRY_SECONDS)
+            return
+        where = f"{address[0]}:{address[1]}"
+        self._node.log.info("Established a socket connection from %s", where)
+        if not workers.offer(lambda: self._serve(SocketPort(connection), where)):
+            self._node.log.warning("refused %s: %d devices are connected", where, _DEVICES)
+            connection.close()
+
     def _serve(self, port: DevicePort, where: str) -> None:
         try:
             Link(self._node, port, startup=0.0).run()
-        except OSError as error:
+        except (OSError, ClosedError) as error:
             self._node.log.info("the device at %s is gone: %s", where, error)
 
 
@@ -99,14 +105,17 @@ def main() -> None:
     with Node("serial_node") as node:
         serve_loggers(node)
         try:
-            _serve(node, words)
+            serve = _prepare(node, words)
         except (ValueError, TypeError) as error:
             sys.exit(f"serial_node: a parameter has a wrong value: {error}\n{_USAGE}")
+        try:
+            serve()
         except MissingSerial as error:
             sys.exit(f"serial_node: {error}")
 
 
-def _serve(node: Node, words: list[str]) -> None:
+def _prepare(node: Node, words: list[str]) -> Callable[[], None]:
+    """Return the function that serves what the words and the parameters name."""
     get = node.params.get
     path = words[0] if words else str(get("~port", "/dev/ttyUSB0"))
     if path == "tcp":
@@ -116,8 +125,8 @@ def _serve(node: Node, words: list[str]) -> None:
             server = TcpServer(node, port)
         except (OSError, OverflowError) as error:
             sys.exit(f"serial_node: cannot listen at TCP port {port}: {error}")
-        server.listen()
-        return
+        return server.listen
     handshake = bool(get("~fix_pyserial_for_test", False))
     startup = float(get("~startup", 2.0))
-    serve_line(node, path, int(get("~baud", 57600)), handshake=handshake, startup=startup)
+    baud = int(get("~baud", 57600))
+    return partial(serve_line, node, path, baud, handshake=handshake, startup=startup)

@@ -1,6 +1,6 @@
 """The programs ``transform`` and ``relay_field``: messages made of parts of other messages.
 
-Both evaluate Python that the command line gives, with the message, or its field, as ``m``.
+Both evaluate Python expressions of the command line; ``m`` in them is the message, or its field.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from rosz.remap import parse
 
 def transform() -> None:
     """Publish the value of an expression for each message."""
-    parser = _parser("Publish the value of a Python expression for each message, or field, 'm'.")
+    parser = _parser("For each message or field 'm', publish the value of a Python expression.")
     parser.add_argument("expression", nargs="?", default="m", help="expression with 'm' in it")
     parser.add_argument(
         "-i", "--import", dest="modules", nargs="+", default=["numpy"], help="modules to import"
     )
-    parser.add_argument("--latch", action="store_true", help="keep the last message for newcomers")
+    parser.add_argument("--latch", action="store_true", help="latch the last message")
     options = parser.parse_args(list(parse(sys.argv[1:]).rest))
     modules = _import_all(options.modules)
     try:
@@ -44,8 +44,8 @@ def transform() -> None:
 
 
 def relay_field() -> None:
-    """Publish messages whose fields are expressions on each message."""
-    parser = _parser("Publish messages whose fields are given in YAML, as expressions on 'm'.")
+    """Publish a message of expressions for each message."""
+    parser = _parser("For each message or field 'm', publish a message of expressions.")
     parser.add_argument("expression", help="fields in YAML, such as 'frame_id: m.data'")
     options = parser.parse_args(list(parse(sys.argv[1:]).rest))
     try:
@@ -77,7 +77,7 @@ def _parser(description: str) -> argparse.ArgumentParser:
 
 
 def _import_all(modules: list[str]) -> dict[str, Any]:
-    """Return the modules by their first names; one that is missing is reported."""
+    """Return modules and their top packages by name; report a module that is missing."""
     imported: dict[str, Any] = {}
     for name in modules:
         try:
@@ -96,9 +96,11 @@ def _evaluate(fields: Any, part: Any) -> Any:
     if not isinstance(fields, str):
         return fields
     try:
-        return eval(fields, {}, {"m": part})  # noqa: S307  # the purpose of the program
+        value = eval(fields, {}, {"m": part})  # noqa: S307  # the purpose of the program
     except (NameError, SyntaxError):
         return fields
+    # "map" is the name of a frame, not the builtin function.
+    return fields if callable(value) else value
 
 
 def _run(

@@ -23,7 +23,6 @@ __all__ = (
     "LookupException",
     "TimeoutException",
     "TransformException",
-    "nanoseconds",
 )
 
 _TEN_SECONDS = 10 * 10**9
@@ -44,7 +43,7 @@ class BufferCore:
     """A buffer of the transforms of the last seconds, which never waits.
 
     Args:
-        cache_time: Age up to which transforms are kept; ten seconds when not given.
+        cache_time: Duration, or seconds, for which transforms are kept; 10 s when not given.
 
     Attributes:
         frames: The buffer that does the work.

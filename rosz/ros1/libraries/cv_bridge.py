@@ -13,17 +13,7 @@ from typing import Any, TypeAlias
 import cv2
 import numpy as np
 
-from rosz.images import (
-    Encoding,
-    ImageError,
-    convert,
-    depth_of,
-    image_array,
-    parse_encoding,
-    saturated,
-    type_of,
-    without_channel,
-)
+from rosz import images
 from rosz.msgs.sensor_msgs.msg import CompressedImage
 from rosz.msgs.sensor_msgs.msg import Image as ImageMessage
 from rosz.ros1.exceptions import raised_as
@@ -48,27 +38,27 @@ _NAMES = {
 _FLAT = 2
 
 
-@raised_as(RuntimeError, ImageError)
+@raised_as(RuntimeError, images.ImageError)
 def getCvType(encoding: str) -> int:
     """Return OpenCV's number of the type of images of an encoding, such as ``cv2.CV_8UC3``.
 
     Raises:
         RuntimeError: The encoding does not exist.
     """
-    return type_of(encoding)
+    return images.type_of(encoding)
 
 
 def CV_MAT_CNWrap(i: int) -> int:
     """Return the number of channels of one of OpenCV's types."""
-    return depth_of(i)[1]
+    return images.depth_of(i)[1]
 
 
 def CV_MAT_DEPTHWrap(i: int) -> int:
     """Return the depth of one of OpenCV's types, such as ``cv2.CV_8U``."""
-    return depth_of(i)[0]
+    return images.depth_of(i)[0]
 
 
-@raised_as(RuntimeError, ImageError)
+@raised_as(RuntimeError, images.ImageError)
 def cvtColor2(source: Image, encoding_in: str, encoding_out: str) -> Image:
     """Return a copy of an image in another encoding.
 
@@ -83,10 +73,10 @@ def cvtColor2(source: Image, encoding_in: str, encoding_out: str) -> Image:
     Raises:
         RuntimeError: The encoding or conversion does not exist, or does not fit the image.
     """
-    return convert(source, encoding_in, encoding_out)
+    return images.convert(source, encoding_in, encoding_out)
 
 
-@raised_as(RuntimeError, ImageError)
+@raised_as(RuntimeError, images.ImageError)
 def cvtColorForDisplay(
     source: Image,
     encoding_in: str,
@@ -112,8 +102,8 @@ def cvtColorForDisplay(
     Raises:
         RuntimeError: The encodings do not serve for that.
     """
-    image = without_channel(np.asarray(source))
-    before = parse_encoding(encoding_in)
+    image = images.without_channel(np.asarray(source))
+    before = images.parse_encoding(encoding_in)
     after = _for_display(before, encoding_out)
     if after.name == _DISPLAY and before.name == _LABELS:
         return np.where(image[..., None] >= 0, _palette()[image % len(_palette())], np.uint8(0))
@@ -133,19 +123,19 @@ def _scaled(image: Image, low: float, high: float) -> Image:
     with np.errstate(invalid="ignore"):  # infinite values
         shifted = image.astype(np.float64) - low
         if image.dtype.kind != "f":
-            shifted = saturated(shifted, image.dtype.type).astype(np.float64)
-        return saturated(shifted * (255.0 / (high - low)), np.uint8)
+            shifted = images.saturated(shifted, image.dtype.type).astype(np.float64)
+        return images.saturated(shifted * (255.0 / (high - low)), np.uint8)
 
 
-def _for_display(before: Encoding, wanted: str) -> Encoding:
+def _for_display(before: images.Encoding, wanted: str) -> images.Encoding:
     if wanted:
-        after = parse_encoding(wanted)
+        after = images.parse_encoding(wanted)
         if after.bits != 8 or not after.color or after.color.startswith(("bayer", "yuv")):  # noqa: PLR2004
             raise RuntimeError(f"'{wanted}' is not for display; expected colours or mono of 8 bits")
         return after
     if before.bits > (32 if before.channels == 1 else 16):
         raise RuntimeError(f"no encoding for display goes with '{before.name}'; name one")
-    return parse_encoding(_DISPLAY)
+    return images.parse_encoding(_DISPLAY)
 
 
 @cache
@@ -210,7 +200,7 @@ class CvBridge:
 
     def cvtype2_to_dtype_with_channels(self, cvtype: int) -> tuple[str, int]:
         """Return numpy's name of the type and the number of channels of OpenCV's type."""
-        depth, channels = depth_of(cvtype)
+        depth, channels = images.depth_of(cvtype)
         return self.cvdepth_to_numpy_depth[depth], channels
 
     def encoding_to_cvtype2(self, encoding: str) -> int:
@@ -219,8 +209,8 @@ class CvBridge:
         Raises:
             CvBridgeError: The encoding does not exist.
         """
-        with raised_as(CvBridgeError, ImageError):
-            return type_of(encoding)
+        with raised_as(CvBridgeError, images.ImageError):
+            return images.type_of(encoding)
 
     def encoding_to_dtype_with_channels(self, encoding: str) -> tuple[str, int]:
         """Return numpy's name of the type and the channels; see `encoding_to_cvtype2`."""
@@ -239,8 +229,8 @@ class CvBridge:
         Raises:
             CvBridgeError: The encoding or conversion does not exist, or the data are too few.
         """
-        with raised_as(CvBridgeError, ImageError):
-            return image_array(img_msg, desired_encoding)
+        with raised_as(CvBridgeError, images.ImageError):
+            return images.image_array(img_msg, desired_encoding)
 
     def cv2_to_imgmsg(
         self, cvim: Image, encoding: str = "passthrough", header: Any = None
@@ -293,8 +283,8 @@ class CvBridge:
         image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
         if image is None or desired_encoding == "passthrough":
             return image
-        with raised_as(CvBridgeError, ImageError):
-            return convert(image, "bgr8", desired_encoding)
+        with raised_as(CvBridgeError, images.ImageError):
+            return images.convert(image, "bgr8", desired_encoding)
 
     def cv2_to_compressed_imgmsg(self, cvim: Image, dst_format: str = "jpg") -> CompressedImage:
         """Return an array as a CompressedImage.

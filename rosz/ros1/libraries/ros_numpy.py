@@ -47,7 +47,7 @@ _from_numpy: dict[tuple[type[Any], bool], Converter] = {}
 
 
 def converts_to_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F], _F]:
-    """Declare that a function makes arrays of messages, or of lists of them.
+    """Register a function that converts a message, or a list of messages, to an array.
 
     Raises:
         TypeError: The type is not a message class.
@@ -56,7 +56,7 @@ def converts_to_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F]
 
 
 def converts_from_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F], _F]:
-    """Declare that a function makes messages, or lists of them; see `converts_to_numpy`."""
+    """Register a function that converts an array back; see `converts_to_numpy`."""
     return _declaring(_from_numpy, msgtype, plural)
 
 
@@ -69,7 +69,7 @@ def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
         kwargs: Likewise.
 
     Raises:
-        ValueError: Messages of that type have no array, or the list is empty.
+        ValueError: No function converts messages of that type, or the list is empty.
     """
     if msg is None:
         return None
@@ -93,7 +93,7 @@ def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, **kwargs: Any) -> An
         kwargs: Likewise; ``plural=True`` returns a list of messages.
 
     Raises:
-        ValueError: Messages of that type are not made of arrays.
+        ValueError: No function converts arrays to messages of that type.
     """
     convert = _find(_from_numpy, msg_type, plural=kwargs.pop("plural", False))
     if convert is None:
@@ -117,7 +117,7 @@ def _declaring(
 def _find(
     table: dict[tuple[type[Any], bool], Converter], msgtype: type[Any], *, plural: bool
 ) -> Converter | None:
-    """Return the function of a class, or of the class that `numpy_msg` made it of."""
+    """Return the function of a class, or of its nearest base class that has one."""
     converters = (table.get((each, plural)) for each in msgtype.__mro__)
     return next((function for function in converters if function is not None), None)
 
@@ -226,7 +226,7 @@ def _check(array: Any, shape: tuple[int, ...]) -> None:
 
 
 def _each(make: Callable[[Any], Any], array: Any, dimensions: int) -> Any:
-    """Return the message of an array, or an array of the messages of its parts."""
+    """Return the message of an array; if that has more dimensions, an array of messages."""
     if array.ndim == dimensions:
         return make(array)
     made = np.empty(array.shape[:-dimensions], object)
@@ -278,7 +278,7 @@ def numpy_to_image(arr: Any, encoding: str) -> Image:
     """Return the message of an array of pixels.
 
     Raises:
-        TypeError: The encoding is unknown, or the array is none of it.
+        TypeError: The encoding is unknown, or the array does not match it.
     """
     kind, expected = _kind(encoding)
     if arr.ndim not in {2, 3}:

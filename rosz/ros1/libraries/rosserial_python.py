@@ -13,17 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from rosz.msgs.rosserial_msgs.msg import TopicInfo
-from rosz.programs.rosserial import (
-    DevicePort,
-    DeviceService,
-    FilePort,
-    Half,
-    Link,
-    Packet,
-    TcpServer,
-    check_definition,
-    open_serial,
-)
+from rosz.programs import rosserial
 from rosz.ros1 import state
 from rosz.ros1.client import rospy
 
@@ -62,7 +52,7 @@ def load_service(package: str, service: str) -> tuple[Any, Any, Any]:
 
 def _message_of(info: Any) -> Any:
     """Return the class of a topic that a device has announced, or raise a TypeMismatch."""
-    return check_definition(info, load_message(*info.message_type.split("/")))
+    return rosserial.check_definition(info, load_message(*info.message_type.split("/")))
 
 
 def _encoded(message: Any) -> bytes:
@@ -131,9 +121,9 @@ class ServiceServer:
         self.id = topic_info.topic_id
         self.parent = parent
         srv, self.mreq, self.mres = load_service(*topic_info.message_type.split("/"))
-        self._service = DeviceService(lambda _, req: parent.send(self.id, _encoded(req)))
-        self._service.request = Half(topic_info, self.mreq)
-        self._service.response = Half(topic_info, self.mres)
+        self._service = rosserial.DeviceService(lambda _, req: parent.send(self.id, _encoded(req)))
+        self._service.request = rosserial.Half(topic_info, self.mreq)
+        self._service.response = rosserial.Half(topic_info, self.mres)
         self.service = rospy.Service(self.topic, srv, self.callback)
 
     def callback(self, req: Any) -> Any:
@@ -227,16 +217,20 @@ class SerialClient:
         self.services: dict[str, Any] = {}
         self.callbacks: dict[int, Callable[[bytes], object]] = {}
         self.buffer_in = self.buffer_out = -1
-        self._link: Link | None = None
-        opened: DevicePort | None = FilePort(port) if hasattr(port, "read") else None
+        self._link: rosserial.Link | None = None
+        opened: rosserial.DevicePort | None = (
+            rosserial.FilePort(port) if hasattr(port, "read") else None
+        )
         while opened is None and not node.is_shutdown:
             try:
-                opened = open_serial(str(port), int(baud), handshake=fix_pyserial_for_test)
+                opened = rosserial.open_serial(
+                    str(port), int(baud), handshake=fix_pyserial_for_test
+                )
             except OSError as error:
                 node.log.error("Error opening serial: %s", error)  # noqa: TRY400  # no defect
                 node.context.wait_for_shutdown(_RETRY_SECONDS)
         if opened is not None:
-            self._link = Link(node, opened, timeout=timeout)
+            self._link = rosserial.Link(node, opened, timeout=timeout)
             self.callbacks = self._link.device.callbacks
         self._own = self.callbacks.copy()
         self.callbacks |= {
@@ -281,7 +275,7 @@ class SerialClient:
             text = "dropped a message of topic %d: it has %d bytes, the device's buffer %d"
             rospy.logerr(text, topic, len(msg), self.buffer_in)
         elif self._link is not None:
-            self._link.send(Packet(topic, msg))
+            self._link.send(rosserial.Packet(topic, msg))
 
     setupPublisher = _handler(_PUBLISHER, "Publish a topic that the device announces.")  # noqa: N815  # ROS 1's names
     setupSubscriber = _handler(_SUBSCRIBER, "Subscribe to a topic that the device announces.")  # noqa: N815
@@ -336,4 +330,4 @@ class RosSerialServer:
         Raises:
             OSError: The port cannot be used.
         """
-        TcpServer(self._node, int(self.tcp_portnum)).listen()
+        rosserial.TcpServer(self._node, int(self.tcp_portnum)).listen()

@@ -5,7 +5,7 @@ Importing it registers the types for ``Buffer.transform`` and ``tf2_ros.convert`
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 from rosz.msgs.geometry_msgs.msg import Point, PointStamped
 from rosz.ros1.client.tf2_geometry_msgs import transform_to_kdl
@@ -26,32 +26,31 @@ __all__ = (
 
 def do_transform_vector(vector: Vector, transform: Any) -> Vector:
     """Transform a point by a TransformStamped, whose header the result has."""
-    moved: Vector = _moved(vector, transform)
-    return moved
+    return _moved(vector, transform)
 
 
 def do_transform_frame(frame: Frame, transform: Any) -> Frame:
     """Transform a frame by a TransformStamped, whose header the result has."""
-    moved: Frame = _moved(frame, transform)
-    return moved
+    return _moved(frame, transform)
 
 
 def do_transform_twist(twist: Twist, transform: Any) -> Twist:
     """Transform a twist by a TransformStamped, whose header the result has."""
-    moved: Twist = _moved(twist, transform)
-    return moved
+    return _moved(twist, transform)
 
 
 def do_transform_wrench(wrench: Wrench, transform: Any) -> Wrench:
     """Transform a wrench by a TransformStamped, whose header the result has."""
-    moved: Wrench = _moved(wrench, transform)
-    return moved
+    return _moved(wrench, transform)
 
 
-def _moved(value: Any, transform: Any) -> Any:
-    moved = transform_to_kdl(transform) * value
+_Moved = TypeVar("_Moved", Vector, Frame, Twist, Wrench)
+
+
+def _moved(value: _Moved, transform: Any) -> _Moved:
+    moved: Any = transform_to_kdl(transform) * value
     moved.header = transform.header
-    return moved
+    return moved  # type: ignore[no-any-return]
 
 
 def to_msg_vector(vector: Any) -> PointStamped:

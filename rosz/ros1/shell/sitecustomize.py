@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
     from types import FrameType, ModuleType
 
-_NEEDED = sys.stdlib_module_names | {"msgspec", "rosz", "yaml", "zenoh"}
-"""Modules that rosz itself needs."""
-
 
 class _Silence:
     """A context in which Ctrl-C ends the process at once, without a traceback.
@@ -39,6 +36,12 @@ class _Silence:
                 signal.signal(signal.SIGINT, after)
             except ValueError:  # not the main thread
                 return
+
+
+_silence = _Silence()
+_silence.__enter__()
+_NEEDED = sys.stdlib_module_names | {"msgspec", "rosz", "yaml", "zenoh"}
+"""Modules that rosz itself needs."""
 
 
 class _Last:
@@ -82,18 +85,25 @@ def _run_next() -> None:
     from importlib.machinery import PathFinder
     from os.path import realpath, split
 
-    here = realpath(split(__file__)[0])
-    others = [folder for folder in sys.path if realpath(folder) != here]
+    done = {*_done, realpath(split(__file__)[0])}
+    others = [folder for folder in sys.path if realpath(folder) not in done]
     spec = PathFinder.find_spec("sitecustomize", others)
     if spec is not None and spec.loader is not None:
         module = type(sys)("sitecustomize")
         module.__file__, module.__spec__ = spec.origin, spec
+        vars(module)["_done"] = done
         spec.loader.exec_module(module)
 
 
-_silence = _Silence()
-with _silence:
-    sys.meta_path.append(_Last())
+_done: "set[str]" = globals().get("_done", set())
+"""Folders whose ``sitecustomize`` has run this one: those of other installations of rosz."""
+
+try:
+    if not _done:
+        sys.meta_path.append(_Last())
     _run_next()
-if sys.orig_argv[1:4] == ["-P", "-m", "rosz"]:  # a command, which wants it so from its start
-    _silence.__enter__()
+finally:
+    _started = " ".join(sys.orig_argv[1:4])
+    # A command wants it so from its start.
+    if _started != "-P -m rosz" and not _started.partition(" ")[0].endswith("/bin/rosz"):
+        _silence.__exit__()

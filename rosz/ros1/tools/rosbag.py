@@ -17,19 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-from rosz.bags import (
-    BagReader,
-    BagWriter,
-    Channel,
-    Entry,
-    Summary,
-    create_file,
-    decoder_of,
-    format_summary,
-    format_yaml,
-    open_reader,
-    summarize,
-)
+from rosz import bags
 from rosz.bags.edit import Transfer
 from rosz.bags.formats import Ros1Reader, ros1_definition
 from rosz.errors import BagError, BagUnindexed, UsageError
@@ -40,19 +28,6 @@ from rosz.ros1.client.rospy import Time
 from rosz.ros1.importer import type_store
 from rosz.ros1.tool import Tool
 from rosz.ros1.tools.rosgraph.names import canonicalize_name
-
-__all__ = (
-    "Bag",
-    "BagMessage",
-    "BagMessageWithConnectionHeader",
-    "Compression",
-    "ROSBagEncryptException",
-    "ROSBagEncryptNotSupportedException",
-    "ROSBagException",
-    "ROSBagFormatException",
-    "ROSBagUnindexedException",
-    "rosbagmain",
-)
 
 
 class ROSBagException(Exception):
@@ -197,8 +172,8 @@ class Bag(Closing):
         self.mode = mode
         self._skip_index = skip_index
         self._types = type_store()
-        self._reader: BagReader | None = None
-        self._writer: BagWriter | None = None
+        self._reader: bags.BagReader | None = None
+        self._writer: bags.BagWriter | None = None
         self._handles: dict[str, tuple[int, bool]] = {}
         self._temporary: Path | None = None
         self._stream: Any = None
@@ -234,8 +209,8 @@ class Bag(Closing):
             raise FileNotFoundError(2, "No such file or directory", str(self._path))
         self._reader = self._open_indexed(allow_unindexed)
 
-    def _open_indexed(self, allow_unindexed: bool) -> BagReader:
-        reader = open_reader(self._path)
+    def _open_indexed(self, allow_unindexed: bool) -> bags.BagReader:
+        reader = bags.open_reader(self._path)
         if not reader.indexed and not allow_unindexed:
             reader.close()
             raise ROSBagUnindexedException
@@ -251,7 +226,7 @@ class Bag(Closing):
         target = self._temporary or self._path
         suffix = target.suffix in {".bag", ".mcap"}
         try:
-            self._writer = create_file(
+            self._writer = bags.create_file(
                 target if suffix else target.with_name(f"{target.name}.bag"),
                 compression=self.compression,  # type: ignore[arg-type]
                 replace=True,
@@ -287,7 +262,7 @@ class Bag(Closing):
             return reader.size
 
     @contextmanager
-    def _view(self) -> Iterator[BagReader]:
+    def _view(self) -> Iterator[bags.BagReader]:
         """Open the bag as it is so far."""
         self._check_open()
         with _translated():
@@ -297,13 +272,13 @@ class Bag(Closing):
             self.flush()
             written = self._temporary or self._path
             if written.stat().st_size:
-                with open_reader(written) as reader:
+                with bags.open_reader(written) as reader:
                     yield reader
                 return
             # Nothing has been written, so there is no file header either.
             with tempfile.TemporaryDirectory(prefix="rosz-bag-") as folder:
-                create_file(Path(folder, "empty.bag")).close()
-                with open_reader(Path(folder, "empty.bag")) as reader:
+                bags.create_file(Path(folder, "empty.bag")).close()
+                with bags.open_reader(Path(folder, "empty.bag")) as reader:
                     yield reader
 
     def read_messages(
@@ -350,7 +325,7 @@ class Bag(Closing):
         with_header: bool,
     ) -> Iterator[Any]:
         with self._view() as reader:
-            chosen: dict[int, tuple[Channel, Callable[[Any], Any] | None, dict[str, Any]]] = {}
+            chosen: dict[int, tuple[bags.Channel, Callable[[Any], Any] | None, dict[str, Any]]] = {}
             for entry in reader.messages(wanted, *limits):
                 channel = entry.channel
                 if id(channel) not in chosen:
@@ -359,7 +334,7 @@ class Bag(Closing):
                     taken = accept is None or accept(
                         channel.topic, kind, channel.md5, channel.definition, header
                     )
-                    decode = decoder_of(channel, self._types) if taken else None
+                    decode = bags.decoder_of(channel, self._types) if taken else None
                     chosen[id(channel)] = channel, decode, header
                 _, decode, header = chosen[id(channel)]
                 if decode is None:
@@ -422,7 +397,7 @@ class Bag(Closing):
     def get_compression_info(self) -> CompressionTuple:
         """Return the most frequent compression, and the sizes without and with it."""
         with self._view() as reader:
-            compressions = summarize("", reader).compressions
+            compressions = bags.summarize("", reader).compressions
         if not compressions:
             return CompressionTuple(self.compression, 0, 0)
         whole = sum(each.uncompressed for each in compressions)
@@ -431,15 +406,15 @@ class Bag(Closing):
         )
 
     def __str__(self) -> str:
-        return format_summary(self._summary())
+        return bags.format_summary(self._summary())
 
-    def _summary(self) -> Summary:
+    def _summary(self) -> bags.Summary:
         with self._view() as reader:
-            return summarize(self.filename or "", reader, frequencies=not self._skip_index)
+            return bags.summarize(self.filename or "", reader, frequencies=not self._skip_index)
 
     def _get_yaml_info(self, key: str | None = None) -> str:
         """Return what ``rosbag info --yaml`` prints; with a key, one value of it."""
-        text = format_yaml(self._summary())
+        text = bags.format_yaml(self._summary())
         if key is None:
             return text
         import yaml
@@ -488,7 +463,12 @@ class Bag(Closing):
             writer.write(handle, stamp, data)
 
     def _add(
-        self, writer: BagWriter, topic: str, msg: Any, raw: bool, header: Mapping[str, Any] | None
+        self,
+        writer: bags.BagWriter,
+        topic: str,
+        msg: Any,
+        raw: bool,
+        header: Mapping[str, Any] | None,
     ) -> tuple[int, bool]:
         """Add the connection of a topic; return its handle, and whether it has CDR."""
         if raw and len(msg) not in (4, 5):
@@ -496,7 +476,7 @@ class Bag(Closing):
         cls = (msg[-1] or self._types.message(msg[0])) if raw else type(msg)
         cdr = writer.format != "rosbag"
         given = {name: _text(value) for name, value in (header or {}).items()}
-        channel = Channel(
+        channel = bags.Channel(
             topic=topic,
             type=cls._type_name,
             encoding="cdr" if cdr else "ros1",
@@ -568,7 +548,7 @@ def _text(value: Any) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _header(reader: BagReader, channel: Channel) -> dict[str, Any]:
+def _header(reader: bags.BagReader, channel: bags.Channel) -> dict[str, Any]:
     if isinstance(reader, Ros1Reader):
         return {"topic": channel.topic.encode(), **reader.connection(channel).header}
     return {
@@ -580,7 +560,7 @@ def _header(reader: BagReader, channel: Channel) -> dict[str, Any]:
     }
 
 
-def _raw(entry: Entry, decode: Callable[[Any], Any]) -> tuple[Any, ...]:
+def _raw(entry: bags.Entry, decode: Callable[[Any], Any]) -> tuple[Any, ...]:
     channel = entry.channel
     message_type: Any = getattr(decode, "__self__", None)
     data = bytes(entry.data) if channel.encoding == "ros1" else decode(entry.data).to_ros1()

@@ -6,18 +6,8 @@ import sys
 import threading
 from collections.abc import Sequence
 
+from rosz import introspect
 from rosz.errors import NotFoundError, RoszError
-from rosz.introspect import (
-    Survey,
-    format_connections,
-    format_node,
-    in_namespace,
-    list_nodes,
-    machines,
-    nodes_on_machine,
-)
-from rosz.introspect import kill_nodes as end_nodes
-from rosz.introspect import ping as measure_ping
 from rosz.ros1.exceptions import raised_as
 from rosz.ros1.state import ready_context, survey, token_uri
 from rosz.ros1.tool import Tool
@@ -45,7 +35,7 @@ def get_node_names(namespace: str | None = None) -> list[str]:
         namespace: Namespace of the nodes to list.
     """
     names = dict.fromkeys(survey().view.nodes())
-    return [name for name in names if in_namespace(name, namespace or "/")]
+    return [name for name in names if introspect.in_namespace(name, namespace or "/")]
 
 
 def get_api_uri(master: Master, caller_id: str, skip_cache: bool = False) -> str | None:  # noqa: ARG001
@@ -64,7 +54,7 @@ def get_api_uri(master: Master, caller_id: str, skip_cache: bool = False) -> str
 
 def get_machines_by_nodes() -> list[str]:
     """Return the machines on which nodes run."""
-    return machines(list_nodes(survey()))
+    return introspect.machines(introspect.list_nodes(survey()))
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
@@ -74,7 +64,7 @@ def get_nodes_by_machine(machine: str) -> list[str]:
         ROSNodeException: No node runs there.
     """
     with raised_as(ROSNodeException, NotFoundError):
-        return nodes_on_machine(list_nodes(survey()), machine)
+        return introspect.nodes_on_machine(introspect.list_nodes(survey()), machine)
 
 
 def kill_nodes(node_names: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -88,12 +78,14 @@ def kill_nodes(node_names: Sequence[str]) -> tuple[list[str], list[str]]:
     """
     alive = survey()
     present = [name for name in node_names if alive.nodes_named(name)]
-    stayed = {name for name, _ in end_nodes(ready_context().session, alive, present, _KILLED)}
+    stayed = {
+        name for name, _ in introspect.kill_nodes(ready_context().session, alive, present, _KILLED)
+    }
     gone = [name for name in present if name not in stayed]
     return gone, [name for name in node_names if name not in gone]
 
 
-def _member(alive: Survey, name: str) -> Token | None:
+def _member(alive: introspect.Survey, name: str) -> Token | None:
     members = alive.nodes_named(name)
     return members[-1] if members else None
 
@@ -128,7 +120,7 @@ def rosnode_ping(
                 sys.stderr.write(f"cannot ping [{name}]: unknown node\n")
             return False
         try:
-            passed = measure_ping(ready_context().session, member) * 1e3
+            passed = introspect.ping(ready_context().session, member) * 1e3
         except RoszError as error:
             if verbose:
                 sys.stderr.write(f"connection to [{name}] failed: {error}\n")
@@ -183,7 +175,7 @@ def get_node_info_description(node_name: str) -> str:
     member = _member(alive, node_name)
     if member is None:
         return f"Node [{node_name}]\nPublications: None\n\nSubscriptions: None\n\nServices: None\n"
-    return format_node(alive, member).partition("\n")[2]
+    return introspect.format_node(alive, member).partition("\n")[2]
 
 
 def get_node_connection_info_description(node_api: str, master: Master) -> str:  # noqa: ARG001
@@ -201,7 +193,7 @@ def get_node_connection_info_description(node_api: str, master: Master) -> str: 
         if token_uri(alive, token) == node_api:
             process = alive.process(token)
             pid = f"Pid: {process.pid}\n" if process is not None else ""
-            return pid + format_connections(alive, token)
+            return pid + introspect.format_connections(alive, token)
     raise ROSNodeIOException(f"Communication with node[{node_api}] failed!")
 
 

@@ -19,18 +19,7 @@ from rosz.msgs.action_msgs.msg import GoalInfo, GoalStatus
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.unique_identifier_msgs.msg import UUID
 from rosz.ros2.rclpy.executors import CallbackGroup, Future, completed, in_background
-from rosz.session import LONGEST_WAIT
-
-__all__ = (
-    "ActionClient",
-    "ActionServer",
-    "CancelResponse",
-    "ClientGoalHandle",
-    "GoalResponse",
-    "GoalStatus",
-    "ServerGoalHandle",
-    "get_action_names_and_types",
-)
+from rosz.session import LONGEST_WAIT as _LONGEST_WAIT
 
 _CHECK_PERIOD = 0.5
 """Seconds after which a goal that waits for an executor checks whether the node has ended."""
@@ -323,7 +312,7 @@ class ClientGoalHandle:
 
     def cancel_goal(self) -> Any:
         """Ask the server to cancel the goal, and return its response."""
-        return self._client.native.request_cancel(GoalInfo(self.goal_id), LONGEST_WAIT)
+        return self._client.native.request_cancel(GoalInfo(self.goal_id), _LONGEST_WAIT)
 
     def _followed(self) -> ClientGoal:
         if self._goal is None:
@@ -362,7 +351,7 @@ class ActionClient:
             timeout_sec: Time limit in seconds; none when not given.
         """
         try:
-            self.native.wait_for_server(LONGEST_WAIT if timeout_sec is None else timeout_sec)
+            self.native.wait_for_server(_LONGEST_WAIT if timeout_sec is None else timeout_sec)
         except WaitTimeout:
             return False
         return True
@@ -386,7 +375,7 @@ class ActionClient:
         self._check(goal)
 
         def send() -> ClientGoalHandle:
-            self.native.wait_for_server(LONGEST_WAIT)
+            self.native.wait_for_server(_LONGEST_WAIT)
             return self._send(goal, feedback_callback, goal_uuid)
 
         return self.in_background(send)
@@ -424,7 +413,7 @@ class ActionClient:
                 self._node.rosz_call_soon(lambda: callback(message))
 
         try:
-            sent = self.native.send(goal, feedback=receive, timeout=LONGEST_WAIT, goal_id=goal_id)
+            sent = self.native.send(goal, feedback=receive, timeout=_LONGEST_WAIT, goal_id=goal_id)
         except GoalRejected:
             return ClientGoalHandle(self, goal_id, None)
         return ClientGoalHandle(self, goal_id, sent)

@@ -19,8 +19,6 @@ from rosz.program import own
 from rosz.ros2.rclpy import arguments
 from rosz.ros2.rclpy.exceptions import NotInitializedException
 
-__all__ = ("Context", "get_default_context")
-
 
 class Context:
     """The connection of a program to the network.

@@ -6,20 +6,26 @@ import inspect
 import threading
 from collections import deque
 from collections.abc import Callable
+from enum import IntEnum
 from typing import Any
 
 from rosz.errors import ServiceError, WaitTimeout
 from rosz.message import Message
 from rosz.message import Service as ServiceType
+from rosz.msgs.service_msgs.msg import ServiceEventInfo
+from rosz.node import Client as RoszClient
 from rosz.node import Clock as RoszClock
 from rosz.node import MessageInfo
 from rosz.node import Node as RoszNode
 from rosz.node import Publisher as RoszPublisher
+from rosz.node import Service as RoszService
 from rosz.node import Subscription as RoszSubscription
 from rosz.node import Timer as RoszTimer
+from rosz.node.ros2 import event_class
 from rosz.qos import QoS
 from rosz.ros2.rclpy.events import EventHandler, SubscriptionEventCallbacks, handlers_of
 from rosz.ros2.rclpy.executors import CallbackGroup, Future, completed, in_background
+from rosz.ros2.rclpy.qos import QoSProfile, to_qos
 from rosz.ros2.rclpy.time import Clock
 from rosz.session import LONGEST_WAIT
 
@@ -173,6 +179,67 @@ def _ros2_info(info: MessageInfo) -> dict[str, Any]:
     }
 
 
+class ServiceIntrospectionState(IntEnum):
+    """The content of the events of a service: no events, only the metadata, or the messages too."""
+
+    OFF = 0
+    METADATA = 1
+    CONTENTS = 2
+
+
+class ServiceEvents:
+    """The events of a service that one of its ends publishes, on its topic ``_service_event``."""
+
+    def __init__(self, node: RoszNode, end: RoszService | RoszClient) -> None:
+        self._node = node
+        self._end = end
+        self._publisher: RoszPublisher[Any] | None = None
+
+    def configure_introspection(
+        self,
+        clock: Clock,
+        service_event_qos_profile: QoSProfile | int,
+        introspection_state: ServiceIntrospectionState,
+    ) -> None:
+        """Begin or end publishing the events of the service that this end sees.
+
+        Args:
+            clock: Clock for the times of the events.
+            service_event_qos_profile: Profile of the publisher, or depth of its queue.
+            introspection_state: The content of the events.
+        """
+        self._end.introspect = None
+        if self._publisher is not None:
+            self._publisher.close()
+            self._publisher = None
+        if introspection_state == ServiceIntrospectionState.OFF:
+            return
+        event = event_class(self._node.context.types, self._end.service_type._type_name)
+        topic, qos = f"{self._end.name}/_service_event", to_qos(service_event_qos_profile)
+        self._publisher = publisher = self._node.publisher(topic, event, qos=qos)
+
+        def publish(name: str, gid: bytes, number: int, message: Any) -> None:
+            stamp = clock.now().to_msg()
+            info = ServiceEventInfo(getattr(ServiceEventInfo, name), stamp, gid, number)
+            given = [message] if introspection_state == ServiceIntrospectionState.CONTENTS else []
+            publisher.publish(event(info, **{name.partition("_")[0].lower(): given}))
+
+        self._end.introspect = publish
+
+    @property
+    def srv_name(self) -> str:
+        """Full name of the service."""
+        return self._end.name
+
+    service_name = srv_name
+
+    def destroy(self) -> None:
+        """Close this end of the service."""
+        self._end.close()
+        if self._publisher is not None:
+            self._publisher.close()
+
+
 class _Call:
     """A service call that waits for an executor."""
 
@@ -183,7 +250,7 @@ class _Call:
         self.error: BaseException | None = None
 
 
-class Service:
+class Service(ServiceEvents):
     """Serve a service; made by ``Node.create_service``."""
 
     def __init__(
@@ -202,14 +269,7 @@ class Service:
         self._wake = wake
         self._calls: deque[_Call] = deque()
         self._service = node.service(srv_name, srv_type, self._serve)
-        self._node = node
-
-    @property
-    def srv_name(self) -> str:
-        """Full name of the service."""
-        return self._service.name
-
-    service_name = srv_name
+        super().__init__(node, self._service)
 
     def _serve(self, request: Any) -> Any:
         """Queue a call for the executor, and wait for the response."""
@@ -240,12 +300,8 @@ class Service:
         finally:
             call.finished.set()
 
-    def destroy(self) -> None:
-        """Close the service."""
-        self._service.close()
 
-
-class Client:
+class Client(ServiceEvents):
     """Call a service; made by ``Node.create_client``."""
 
     def __init__(
@@ -258,14 +314,8 @@ class Client:
     ) -> None:
         self.srv_type: type[Any] = srv_type
         self._client = node.client(srv_name, srv_type, timeout=LONGEST_WAIT)
+        super().__init__(node, self._client)
         self._call_soon = call_soon
-
-    @property
-    def srv_name(self) -> str:
-        """Full name of the service."""
-        return self._client.name
-
-    service_name = srv_name
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
         """Call the service, and wait for the response.
@@ -317,10 +367,6 @@ class Client:
         except WaitTimeout:
             return False
         return True
-
-    def destroy(self) -> None:
-        """Close the client."""
-        self._client.close()
 
 
 class Timer:

@@ -18,19 +18,6 @@ from rosz.node import Publisher, Subscription
 from rosz.ros2.rclpy.executors import CallbackGroup
 from rosz.wire import Token
 
-__all__ = (
-    "EventHandler",
-    "GuardCondition",
-    "IncompatibleTypeInfo",
-    "MatchedInfo",
-    "MessageLostInfo",
-    "PublisherEventCallbacks",
-    "SubscriptionEventCallbacks",
-    "UnsupportedEventTypeError",
-    "handlers_of",
-)
-
-
 _KINDS = ("matched", "incompatible_type", "incompatible_qos", "deadline", "liveliness")
 
 

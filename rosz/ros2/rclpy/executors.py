@@ -16,30 +16,12 @@ from collections.abc import Callable, Coroutine, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
+from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple, Protocol, Self
 
 from rosz.errors import RoszError
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.session import clamp_timeout
-
-__all__ = (
-    "CallbackGroup",
-    "Entity",
-    "Executor",
-    "ExternalShutdownException",
-    "Future",
-    "MultiThreadedExecutor",
-    "MutuallyExclusiveCallbackGroup",
-    "Ready",
-    "ReentrantCallbackGroup",
-    "ShutdownException",
-    "SingleThreadedExecutor",
-    "Task",
-    "TimeoutException",
-    "completed",
-    "get_global_executor",
-    "in_background",
-)
 
 Job = Callable[[], object]
 _THREADS = 4
@@ -292,7 +274,8 @@ class Executor:
     def __init__(self, *, context: Context | None = None) -> None:
         self.context: Context = context or get_default_context()
         self._nodes: list[Any] = []
-        self._wakeup = threading.Event()
+        # One for each wait. An event would stay locked if Ctrl-C interrupted one of its methods.
+        self._wakeups: list[SimpleQueue[None]] = []
         self._soon: deque[Job] = deque()
         self._ready: deque[Ready] = deque()
         self._is_shutdown = False
@@ -319,7 +302,9 @@ class Executor:
 
     def wake(self) -> None:
         """Make the executor look for ready callbacks; any thread may call this."""
-        self._wakeup.set()
+        for wakeup in tuple(self._wakeups):
+            if wakeup.empty():
+                wakeup.put(None)
 
     def call_soon(self, job: Job) -> None:
         """Run a function like a callback; any thread may call this."""
@@ -410,15 +395,22 @@ class Executor:
 
     def _wait(self, timeout: float | None, finished: Callable[[], bool]) -> Ready | None:
         deadline = _deadline(timeout)
-        while self.context.ok() and not self._is_shutdown and not finished():
-            self._wakeup.clear()
-            ready = self._next()
-            if ready is not None:
-                return ready
-            left = None if deadline is None else deadline - time.monotonic()
-            if left is not None and left <= 0:
-                return None
-            self._wakeup.wait(left)
+        wakeup: SimpleQueue[None] = SimpleQueue()
+        self._wakeups.append(wakeup)
+        try:
+            while self.context.ok() and not self._is_shutdown and not finished():
+                while not wakeup.empty():
+                    wakeup.get()
+                ready = self._next()
+                if ready is not None:
+                    return ready
+                left = None if deadline is None else deadline - time.monotonic()
+                if left is not None and left <= 0:
+                    return None
+                with suppress(Empty):
+                    wakeup.get(timeout=left)
+        finally:
+            self._wakeups.remove(wakeup)
         if self.context.ended_by_signal:
             raise ExternalShutdownException
         return None

@@ -12,32 +12,12 @@ from functools import wraps
 from typing import Any, NamedTuple
 
 from rosz.errors import RoszError
+from rosz.msgs.lifecycle_msgs import srv
 from rosz.msgs.lifecycle_msgs.msg import State as StateMessage
 from rosz.msgs.lifecycle_msgs.msg import Transition, TransitionDescription, TransitionEvent
-from rosz.msgs.lifecycle_msgs.srv import (
-    ChangeState,
-    GetAvailableStates,
-    GetAvailableTransitions,
-    GetState,
-)
 from rosz.ros2.rclpy.entities import Publisher as PlainPublisher
 from rosz.ros2.rclpy.executors import CallbackGroup
 from rosz.ros2.rclpy.node import Node as PlainNode
-
-__all__ = (
-    "LifecycleNode",
-    "LifecycleNodeMixin",
-    "LifecyclePublisher",
-    "LifecycleState",
-    "ManagedEntity",
-    "Node",
-    "NodeMixin",
-    "Publisher",
-    "SimpleManagedEntity",
-    "State",
-    "TransitionCallbackReturn",
-    "TransitionError",
-)
 
 
 class TransitionError(RoszError):
@@ -128,29 +108,33 @@ _Result = TransitionCallbackReturn
 class ManagedEntity:
     """A part of a managed node that takes part in its transitions."""
 
-    def on_configure(self, state: LifecycleState) -> _Result:  # noqa: ARG002
+    def _rosz_all(self, callback: str, state: LifecycleState) -> _Result:  # noqa: ARG002
+        """Call a callback of the entities that belong to this one, which has none."""
+        return _Result.SUCCESS
+
+    def on_configure(self, state: LifecycleState) -> _Result:
         """Prepare to work, coming from a state."""
-        return _Result.SUCCESS
+        return self._rosz_all("on_configure", state)
 
-    def on_cleanup(self, state: LifecycleState) -> _Result:  # noqa: ARG002
+    def on_cleanup(self, state: LifecycleState) -> _Result:
         """Undo what `on_configure` did."""
-        return _Result.SUCCESS
+        return self._rosz_all("on_cleanup", state)
 
-    def on_shutdown(self, state: LifecycleState) -> _Result:  # noqa: ARG002
+    def on_shutdown(self, state: LifecycleState) -> _Result:
         """Prepare for the end."""
-        return _Result.SUCCESS
+        return self._rosz_all("on_shutdown", state)
 
-    def on_activate(self, state: LifecycleState) -> _Result:  # noqa: ARG002
+    def on_activate(self, state: LifecycleState) -> _Result:
         """Begin to work."""
-        return _Result.SUCCESS
+        return self._rosz_all("on_activate", state)
 
-    def on_deactivate(self, state: LifecycleState) -> _Result:  # noqa: ARG002
+    def on_deactivate(self, state: LifecycleState) -> _Result:
         """Stop working."""
-        return _Result.SUCCESS
+        return self._rosz_all("on_deactivate", state)
 
-    def on_error(self, state: LifecycleState) -> _Result:  # noqa: ARG002
+    def on_error(self, state: LifecycleState) -> _Result:
         """Recover from an error of another callback."""
-        return _Result.SUCCESS
+        return self._rosz_all("on_error", state)
 
 
 class SimpleManagedEntity(ManagedEntity):
@@ -216,6 +200,8 @@ class LifecyclePublisher(SimpleManagedEntity, PlainPublisher):
 class LifecycleNodeMixin(ManagedEntity):
     """The states of a managed node, for a class that derives from `rclpy.node.Node` as well.
 
+    Callbacks of transitions that are not overridden call those of the managed entities.
+
     Args:
         enable_communication_interface: Whether others may see and change the state, by services
             and the topic ``~/transition_event``.
@@ -245,15 +231,15 @@ class LifecycleNodeMixin(ManagedEntity):
 
             node.create_service(kind, f"{name}/{service}", respond, callback_group=group)
 
-        offer(ChangeState, "change_state", "success", self._rosz_change_state)
-        offer(GetState, "get_state", "current_state", lambda _: _message(self._rosz_state))
+        offer(srv.ChangeState, "change_state", "success", self._rosz_change_state)
+        offer(srv.GetState, "get_state", "current_state", lambda _: _message(self._rosz_state))
         offer(
-            GetAvailableStates,
+            srv.GetAvailableStates,
             "get_available_states",
             "available_states",
             lambda _: list(map(_message, _STATES.values())),
         )
-        kind, field = GetAvailableTransitions, "available_transitions"
+        kind, field = srv.GetAvailableTransitions, "available_transitions"
         offer(
             kind,
             "get_available_transitions",
@@ -335,30 +321,6 @@ class LifecycleNodeMixin(ManagedEntity):
             if result is not _Result.SUCCESS:
                 return result
         return _Result.SUCCESS
-
-    def on_configure(self, state: LifecycleState) -> _Result:
-        """Prepare to work, coming from a state: calls the managed entities."""
-        return self._rosz_all("on_configure", state)
-
-    def on_cleanup(self, state: LifecycleState) -> _Result:
-        """Undo what `on_configure` did: calls the managed entities."""
-        return self._rosz_all("on_cleanup", state)
-
-    def on_shutdown(self, state: LifecycleState) -> _Result:
-        """Prepare for the end: calls the managed entities."""
-        return self._rosz_all("on_shutdown", state)
-
-    def on_activate(self, state: LifecycleState) -> _Result:
-        """Begin to work: calls the managed entities."""
-        return self._rosz_all("on_activate", state)
-
-    def on_deactivate(self, state: LifecycleState) -> _Result:
-        """Stop working: calls the managed entities."""
-        return self._rosz_all("on_deactivate", state)
-
-    def on_error(self, state: LifecycleState) -> _Result:
-        """Recover from an error of another callback: calls the managed entities."""
-        return self._rosz_all("on_error", state)
 
     def trigger_configure(self) -> _Result:
         """Configure the node.

@@ -23,14 +23,6 @@ from rosz.node import (
     severity_name,
 )
 
-__all__ = (
-    "LoggingSeverity",
-    "RcutilsLogger",
-    "get_logger",
-    "serve_logger_levels",
-    "write_as_rclpy",
-)
-
 _DEFAULT_FORMAT = "[{severity}] [{time}] [{name}]: {message}"
 _TOKEN = re.compile(r"\{(\w+)\}")
 _COLORS = {10: "\033[32m", 20: "\033[0m", 30: "\033[33m", 40: "\033[31m", 50: "\033[31m"}

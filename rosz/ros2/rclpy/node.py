@@ -9,6 +9,7 @@ from rosz import names
 from rosz.errors import UsageError
 from rosz.node import Node as RoszNode
 from rosz.node import simulate
+from rosz.ros2.rclpy import executors
 from rosz.ros2.rclpy.context import Context, get_default_context
 from rosz.ros2.rclpy.entities import Client, Publisher, Service, Subscription, Timer
 from rosz.ros2.rclpy.events import (
@@ -19,20 +20,11 @@ from rosz.ros2.rclpy.events import (
     handlers_of,
 )
 from rosz.ros2.rclpy.exceptions import NotInitializedException
-from rosz.ros2.rclpy.executors import (
-    CallbackGroup,
-    Entity,
-    Executor,
-    MutuallyExclusiveCallbackGroup,
-    get_global_executor,
-)
 from rosz.ros2.rclpy.logging import RcutilsLogger, serve_logger_levels, write_as_rclpy
 from rosz.ros2.rclpy.parameter import NodeParameters, Parameter
 from rosz.ros2.rclpy.qos import QoSOverridingOptions, QoSProfile, override_qos, to_qos
 from rosz.ros2.rclpy.time import Clock, Rate, ROSClock
 from rosz.wire import Kind, Token
-
-__all__ = ("Node",)
 
 P = TypeVar("P")
 _SECOND = 1_000_000_000
@@ -74,7 +66,7 @@ class Node(NodeParameters):
         unknown = options.keys() - _OPTIONS
         if unknown:
             raise UsageError(f"Node takes no '{min(unknown)}' in rosz")
-        self.executor: Executor | None = None
+        self.executor: executors.Executor | None = None
         node = RoszNode(node_name, namespace=namespace, context=self.context.opened)
         given = self.context.given
         overrides: dict[str, Any] = {}
@@ -85,12 +77,13 @@ class Node(NodeParameters):
         self._clock = ROSClock(self.rosz_node.clock)
         self._rosz_logger_name = self.rosz_node.name.strip("/").replace("/", ".")
         write_as_rclpy(self.rosz_node.log, self._rosz_logger_name)
-        self.default_callback_group: CallbackGroup = MutuallyExclusiveCallbackGroup()
+        self.default_callback_group: executors.CallbackGroup = (
+            executors.MutuallyExclusiveCallbackGroup()
+        )
         if given.level:
             self.rosz_node.log.set_level("", given.level)
+        self._rosz_after.append(self._rosz_follow_clock)
         self.declare_parameter("use_sim_time", self.rosz_node.clock.simulated)
-        if self.get_parameter("use_sim_time").value and not self.rosz_node.clock.simulated:
-            simulate(self.rosz_node)
         if options.get("enable_logger_service"):
             serve_logger_levels(self, RcutilsLogger(self._rosz_logger_name, self.rosz_node.log))
         if options.get("automatically_declare_parameters_from_overrides"):
@@ -103,7 +96,7 @@ class Node(NodeParameters):
             f"'{type(self).__name__}' has no '{name}': rosz's rclpy.node.Node lacks it"
         )
 
-    def rosz_entities(self) -> Iterator[Entity]:
+    def rosz_entities(self) -> Iterator[executors.Entity]:
         """Yield the entities with callbacks, timers first, which is rclpy's order."""
         parts = list(self._rosz_parts)
         yield from (part for part in parts if isinstance(part, Timer))
@@ -111,6 +104,11 @@ class Node(NodeParameters):
             if not isinstance(part, Timer) and hasattr(part, "take"):
                 yield part
             yield from getattr(part, "event_handlers", ())
+
+    def _rosz_follow_clock(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == "use_sim_time":
+                simulate(self.rosz_node, on=bool(parameter.value))
 
     def rosz_wake(self) -> None:
         """Make the executor look for callbacks that are ready."""
@@ -120,7 +118,7 @@ class Node(NodeParameters):
 
     def rosz_call_soon(self, job: Callable[[], object]) -> None:
         """Let the executor call a function."""
-        (self.executor or get_global_executor()).call_soon(job)
+        (self.executor or executors.get_global_executor()).call_soon(job)
 
     def get_name(self) -> str:
         """Return the base name of the node."""
@@ -150,7 +148,7 @@ class Node(NodeParameters):
         topic: str,
         qos_profile: QoSProfile | int = 10,
         *,
-        callback_group: CallbackGroup | None = None,
+        callback_group: executors.CallbackGroup | None = None,
         event_callbacks: PublisherEventCallbacks | None = None,
         qos_overriding_options: QoSOverridingOptions | None = None,
         publisher_class: type[Publisher] = Publisher,
@@ -194,7 +192,7 @@ class Node(NodeParameters):
         callback: Callable[..., Any],
         qos_profile: QoSProfile | int,
         *,
-        callback_group: CallbackGroup | None = None,
+        callback_group: executors.CallbackGroup | None = None,
         event_callbacks: SubscriptionEventCallbacks | None = None,
         qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
@@ -238,7 +236,7 @@ class Node(NodeParameters):
         self,
         timer_period_sec: float,
         callback: Callable[[], Any] | None,
-        callback_group: CallbackGroup | None = None,
+        callback_group: executors.CallbackGroup | None = None,
         clock: Clock | None = None,
         autostart: bool = True,
     ) -> Timer:
@@ -270,7 +268,7 @@ class Node(NodeParameters):
         srv_name: str,
         callback: Callable[[Any, Any], Any],
         *,
-        callback_group: CallbackGroup | None = None,
+        callback_group: executors.CallbackGroup | None = None,
         **_options: Any,
     ) -> Service:
         """Create a service.
@@ -304,7 +302,7 @@ class Node(NodeParameters):
         )
 
     def create_guard_condition(
-        self, callback: Callable[[], Any], callback_group: CallbackGroup | None = None
+        self, callback: Callable[[], Any], callback_group: executors.CallbackGroup | None = None
     ) -> GuardCondition:
         """Create a guard condition, whose ``trigger`` lets the executor call a function.
 

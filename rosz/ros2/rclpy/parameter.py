@@ -22,24 +22,10 @@ from rosz.errors import RoszError, UsageError
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, ParameterValue, SetParametersResult
 from rosz.node import Node as RoszNode
+from rosz.node.ros2 import type_of
 from rosz.params import type_name
 from rosz.params.yaml import read_plain
-from rosz.ros2.rclpy.exceptions import (
-    InvalidParameterTypeException,
-    InvalidParameterValueException,
-    ParameterAlreadyDeclaredException,
-    ParameterNotDeclaredException,
-    ParameterUninitializedException,
-)
-
-__all__ = (
-    "PARAMETER_SEPARATOR_STRING",
-    "NodeParameters",
-    "Parameter",
-    "get_parameter_value",
-    "parameter_dict_from_yaml_file",
-    "parameter_value_to_python",
-)
+from rosz.ros2.rclpy import exceptions
 
 PARAMETER_SEPARATOR_STRING = "."
 _SPIN_SECONDS = 10.0
@@ -146,21 +132,6 @@ class Parameter:
 
 
 _Type = Parameter.Type
-_SCALARS: dict[type, Parameter.Type] = {
-    type(None): _Type.NOT_SET,
-    bool: _Type.BOOL,
-    int: _Type.INTEGER,
-    float: _Type.DOUBLE,
-    str: _Type.STRING,
-    bytes: _Type.BYTE_ARRAY,
-}
-_ARRAYS = {
-    bool: _Type.BOOL_ARRAY,
-    int: _Type.INTEGER_ARRAY,
-    float: _Type.DOUBLE_ARRAY,
-    str: _Type.STRING_ARRAY,
-    bytes: _Type.BYTE_ARRAY,
-}
 
 
 def _field(kind: Parameter.Type) -> str:
@@ -169,16 +140,16 @@ def _field(kind: Parameter.Type) -> str:
 
 
 def _type_of(value: Any) -> Parameter.Type:
-    scalar = _SCALARS.get(type(value))
-    if scalar is not None:
-        return scalar
-    if isinstance(value, Sequence | array.array):
-        kinds = {type(element) for element in value}
-        if not kinds:
-            return _Type.BYTE_ARRAY  # rclpy's type of an empty list
-        array_type = _ARRAYS.get(kinds.pop())
-        if array_type is not None and not kinds:
-            return array_type
+    if value is None:
+        return _Type.NOT_SET
+    is_array = isinstance(value, Sequence | array.array) and not isinstance(value, str | bytes)
+    elements = list(value) if is_array else [value]
+    if len({*map(type, elements)}) <= 1:  # rclpy does not mix ints with floats
+        if is_array and elements and type(elements[0]) is bytes:
+            return _Type.BYTE_ARRAY
+        number = type_of(elements if is_array else value)
+        if number:
+            return _Type(number)
     raise UsageError(
         f"a parameter cannot be {value!r}; expected a bool, int, float, str, bytes or a list of one"
         " of them"
@@ -300,7 +271,7 @@ class NodeParameters:
             InvalidParameterValueException: A callback refuses the value.
         """
         if name in self._rosz_known:
-            raise ParameterAlreadyDeclaredException([name])
+            raise exceptions.ParameterAlreadyDeclaredException([name])
         kind = value if isinstance(value, Parameter.Type) else None
         chosen = Parameter(name, value=None if kind is not None else value)
         given = _MISSING
@@ -313,7 +284,7 @@ class NodeParameters:
             chosen = _convert(name, given, _Type.NOT_SET if free else kind or chosen.type_)
         refusal = self._rosz_refusal([chosen])
         if refusal:
-            raise InvalidParameterValueException(name, chosen.value, refusal)
+            raise exceptions.InvalidParameterValueException(name, chosen.value, refusal)
         self._rosz_descriptors[name] = descriptor or ParameterDescriptor(name=name)
         self._rosz_set(chosen)
         self.rosz_node.params.watch(
@@ -356,7 +327,7 @@ class NodeParameters:
             return
         try:
             changed = _convert(name, value, parameter.type_)
-        except InvalidParameterTypeException as error:
+        except exceptions.InvalidParameterTypeException as error:
             self._rosz_refuse(parameter, str(error))
             return
         result = self.set_parameters_atomically([changed])
@@ -373,7 +344,7 @@ class NodeParameters:
     def undeclare_parameter(self, name: str) -> None:
         """Remove the declaration of a parameter."""
         if name not in self._rosz_known:
-            raise ParameterNotDeclaredException(name)
+            raise exceptions.ParameterNotDeclaredException(name)
         del self._rosz_known[name], self._rosz_descriptors[name]
 
     def has_parameter(self, name: str) -> bool:
@@ -389,9 +360,9 @@ class NodeParameters:
         """
         parameter = self._rosz_known.get(name)
         if parameter is None:
-            raise ParameterNotDeclaredException(name)
+            raise exceptions.ParameterNotDeclaredException(name)
         if parameter.type_ is _Type.NOT_SET and not self._rosz_descriptors[name].dynamic_typing:
-            raise ParameterUninitializedException(name)
+            raise exceptions.ParameterUninitializedException(name)
         return parameter
 
     def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
@@ -414,7 +385,7 @@ class NodeParameters:
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Return the descriptor of a parameter."""
         if name not in self._rosz_descriptors:
-            raise ParameterNotDeclaredException(name)
+            raise exceptions.ParameterNotDeclaredException(name)
         return self._rosz_descriptors[name]
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
@@ -435,7 +406,7 @@ class NodeParameters:
         names = [parameter.name for parameter in parameter_list]
         missing = [name for name in names if name not in self._rosz_known]
         if missing:
-            raise ParameterNotDeclaredException(missing)
+            raise exceptions.ParameterNotDeclaredException(missing)
         reasons = [self._rosz_mismatch(parameter) for parameter in parameter_list]
         reason = next(filter(None, reasons), "") or self._rosz_refusal(parameter_list)
         if reason:
@@ -518,7 +489,10 @@ class _DeclaredParameters:
         """Return the descriptors of parameters; none if one is not declared."""
         try:
             kinds = [parameter.type_ for parameter in self._node.get_parameters(names)]
-        except (ParameterNotDeclaredException, ParameterUninitializedException):
+        except (
+            exceptions.ParameterNotDeclaredException,
+            exceptions.ParameterUninitializedException,
+        ):
             return []
         return [
             replace(self._node.describe_parameter(name), name=name, type=int(kind))
@@ -576,5 +550,5 @@ def _convert(name: str, value: Any, kind: Parameter.Type) -> Parameter:
     if kind is _Type.DOUBLE_ARRAY and isinstance(value, list):
         value = [float(element) if type(element) is int else element for element in value]
     if not kind.check(value):
-        raise InvalidParameterTypeException(name, kind.name, type_name(value))
+        raise exceptions.InvalidParameterTypeException(name, kind.name, type_name(value))
     return Parameter(name, kind, value)

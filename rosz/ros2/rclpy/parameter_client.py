@@ -7,30 +7,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rosz.msgs.rcl_interfaces.msg import Parameter as ParameterMessage
-from rosz.msgs.rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    GetParameterTypes,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
+from rosz.node.ros2 import SERVICES as _SERVICES
 from rosz.ros2.rclpy.executors import Future
 from rosz.ros2.rclpy.node import Node
 from rosz.ros2.rclpy.parameter import Parameter, parameter_dict_from_yaml_file
-from rosz.session import LONGEST_WAIT
-
-__all__ = ("AsyncParameterClient",)
+from rosz.session import LONGEST_WAIT as _LONGEST_WAIT
 
 _Done = Callable[[Future], object]
-_SERVICES = {
-    "get_parameters": GetParameters,
-    "list_parameters": ListParameters,
-    "set_parameters": SetParameters,
-    "get_parameter_types": GetParameterTypes,
-    "describe_parameters": DescribeParameters,
-    "set_parameters_atomically": SetParametersAtomically,
-}
 
 
 class AsyncParameterClient:
@@ -63,7 +46,7 @@ class AsyncParameterClient:
         Args:
             timeout_sec: Time limit in seconds; none when not given.
         """
-        end = time.monotonic() + (LONGEST_WAIT if timeout_sec is None else timeout_sec)
+        end = time.monotonic() + (_LONGEST_WAIT if timeout_sec is None else timeout_sec)
         return all(
             client.wait_for_service(max(end - time.monotonic(), 0))
             for client in self._clients.values()

@@ -9,32 +9,9 @@ from typing import Any, Self
 
 from rosz.errors import RoszError, UsageError
 from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rosz.qos import FOREVER, QoS
+from rosz.qos import FOREVER as _FOREVER
+from rosz.qos import QoS
 from rosz.ros2.rclpy.time import Duration, Infinite
-
-__all__ = (
-    "DurabilityPolicy",
-    "HistoryPolicy",
-    "InvalidQosOverridesError",
-    "LivelinessPolicy",
-    "QoSDurabilityPolicy",
-    "QoSHistoryPolicy",
-    "QoSLivelinessPolicy",
-    "QoSOverridingOptions",
-    "QoSPolicyKind",
-    "QoSPresetProfiles",
-    "QoSProfile",
-    "QoSReliabilityPolicy",
-    "ReliabilityPolicy",
-    "override_qos",
-    "qos_profile_action_status_default",
-    "qos_profile_parameter_events",
-    "qos_profile_parameters",
-    "qos_profile_sensor_data",
-    "qos_profile_services_default",
-    "qos_profile_system_default",
-    "to_qos",
-)
 
 
 class HistoryPolicy(IntEnum):
@@ -267,7 +244,7 @@ def _policy(name: str, value: Any) -> Any:
 
 
 def _span(duration: Duration) -> int:
-    return duration.nanoseconds or FOREVER
+    return duration.nanoseconds or _FOREVER
 
 
 qos_profile_system_default = QoSProfile(history=HistoryPolicy.SYSTEM_DEFAULT, depth=10)

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from enum import IntEnum
 from functools import total_ordering
-from typing import Any, Self, overload
+from typing import Any, NamedTuple, Self, overload
 
 from rosz.errors import ClosedError
+from rosz.lifecycle import Closing, Registration
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.node import Clock as _RosClock
 from rosz.node import Rate as _Rate
-from rosz.qos import FOREVER
+from rosz.node import TimeJump as _TimeJump
+from rosz.qos import FOREVER as _FOREVER
 from rosz.ros2.rclpy.exceptions import ROSInterruptException
-
-__all__ = (
-    "CONVERSION_CONSTANT",
-    "Clock",
-    "ClockType",
-    "Duration",
-    "Infinite",
-    "ROSClock",
-    "Rate",
-    "Time",
-)
 
 CONVERSION_CONSTANT = 1_000_000_000
 
@@ -72,7 +64,7 @@ class Duration:
         return self._nanoseconds < other.nanoseconds
 
 
-Infinite = Duration(nanoseconds=FOREVER)
+Infinite = Duration(nanoseconds=_FOREVER)
 
 
 class ClockType(IntEnum):
@@ -167,6 +159,65 @@ class Time:
         return self._nanoseconds < self._comparable(other)
 
 
+class ClockChange(IntEnum):
+    """Whether a jump of time begins or ends a simulation."""
+
+    ROS_TIME_NO_CHANGE = 1
+    ROS_TIME_ACTIVATED = 2
+    ROS_TIME_DEACTIVATED = 3
+    SYSTEM_TIME_NO_CHANGE = 4
+
+
+class JumpThreshold:
+    """The jumps of time for which a callback is called.
+
+    Args:
+        min_forward: Smallest jump forward; none when not given.
+        min_backward: Smallest jump back, a negative duration; none when not given.
+        on_clock_change: Whether the beginning and the end of a simulation count, too.
+
+    Raises:
+        ValueError: A duration has the wrong sign.
+    """
+
+    def __init__(
+        self,
+        *,
+        min_forward: Duration | None,
+        min_backward: Duration | None,
+        on_clock_change: bool = True,
+    ) -> None:
+        if min_forward is not None and min_forward.nanoseconds <= 0:
+            raise ValueError("min_forward must be a positive non-zero duration")
+        if min_backward is not None and min_backward.nanoseconds >= 0:
+            raise ValueError("min_backward must be a negative non-zero duration")
+        self.min_forward: Duration | None = min_forward
+        self.min_backward: Duration | None = min_backward
+        self.on_clock_change: bool = on_clock_change
+
+    def rosz_counts(self, jump: _TimeJump) -> bool:
+        """Return whether a step of time is such a jump."""
+        forward, back = self.min_forward, self.min_backward
+        return (
+            (self.on_clock_change and jump.switched)
+            or (forward is not None and jump.delta >= forward.nanoseconds)
+            or (back is not None and jump.delta <= back.nanoseconds)
+        )
+
+
+class TimeJump(NamedTuple):
+    """A jump of time: whether a simulation begins or ends, and by how much time moves."""
+
+    clock_change: ClockChange
+    delta: Duration
+
+
+class JumpHandle(Registration, Closing):
+    """Calls callbacks for jumps of time until ``unregister``; made by a clock."""
+
+    unregister = Registration.close
+
+
 class Clock:
     """A clock of one kind.
 
@@ -195,6 +246,37 @@ class Clock:
         else:
             now = time.time_ns()
         return Time(nanoseconds=now, clock_type=self.clock_type)
+
+    def create_jump_callback(
+        self,
+        threshold: JumpThreshold,
+        *,
+        pre_callback: Callable[[], object] | None = None,
+        post_callback: Callable[[TimeJump], object] | None = None,
+    ) -> JumpHandle:
+        """Call functions when ROS time jumps; the time of other clocks does not.
+
+        Args:
+            threshold: The jumps that the functions are called for.
+            pre_callback: Function called before the time is set.
+            post_callback: Function called after that, with the jump.
+
+        Raises:
+            ValueError: Neither callback is given.
+        """
+        if pre_callback is None and post_callback is None:
+            raise ValueError("One of pre_callback or post_callback must be callable")
+
+        def after(jump: _TimeJump) -> None:
+            active = self._source.simulated
+            change = ClockChange.ROS_TIME_ACTIVATED if active else ClockChange.ROS_TIME_DEACTIVATED
+            if not jump.switched:
+                change = ClockChange.ROS_TIME_NO_CHANGE
+            if post_callback is not None:
+                post_callback(TimeJump(change, Duration(nanoseconds=jump.delta)))
+
+        source = self._source if self.clock_type is ClockType.ROS_TIME else _RosClock()
+        return JumpHandle(source.on_jump(after, wanted=threshold.rosz_counts, before=pre_callback))
 
     def sleep_for(self, rel_time: Duration) -> bool:
         """Sleep for a duration.

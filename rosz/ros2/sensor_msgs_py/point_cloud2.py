@@ -10,16 +10,7 @@ import numpy as np
 
 from rosz.errors import UsageError
 from rosz.msgs.sensor_msgs.msg import PointCloud2, PointField
-from rosz.transforms import FIELD_FORMATS
-
-__all__ = (
-    "create_cloud",
-    "create_cloud_xyz32",
-    "dtype_from_fields",
-    "read_points",
-    "read_points_list",
-    "read_points_numpy",
-)
+from rosz.transforms import FIELD_FORMATS as _FIELD_FORMATS
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 
@@ -36,7 +27,7 @@ def dtype_from_fields(
     """
     columns: dict[str, tuple[str, int]] = {}
     for field in fields:
-        kind = (">" if bigendian else "<") + FIELD_FORMATS[field.datatype]
+        kind = (">" if bigendian else "<") + _FIELD_FORMATS[field.datatype]
         size = np.dtype(kind).itemsize
         base = field.name or f"unnamed_field_{len(columns)}"
         for index in range(max(field.count, 1)):

@@ -13,7 +13,7 @@ import uuid
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 
@@ -23,8 +23,10 @@ from rosz.actions import (
     STATUS,
     TERMINAL,
     ActionlibClient,
+    ActionlibClientGoal,
     ActionlibState,
     ActionTypes,
+    ClientGoal,
     GoalState,
     action_type,
     list_actions,
@@ -38,14 +40,11 @@ from rosz.msgs.action_msgs.msg import GoalStatusArray as StatusArray
 from rosz.msgs.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosz.msgs.unique_identifier_msgs.msg import UUID
 from rosz.names import short_type
+from rosz.node import Node
 from rosz.qos import LATCHED
 from rosz.queue import BoundedQueue
 from rosz.web.model.forms import read_form
 from rosz.worker import Worker, run_task
-
-if TYPE_CHECKING:
-    from rosz.actions import ActionlibClientGoal, ClientGoal
-    from rosz.node import Node
 
 _MOST_GOALS = 30
 _MOST_FEEDBACK = 20

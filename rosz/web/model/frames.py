@@ -64,17 +64,16 @@ class Frames:
             return IDENTITY
         return self.buffer.lookup(fixed, frame, stamp)[0]
 
-    def why_not(self, fixed: str, frame: str, stamp: int = 0) -> str:
-        """Return why a transform is not known; empty if it is."""
+    def locate(self, fixed: str, frame: str, stamp: int = 0) -> tuple[Pose | None, str]:
+        """Return the pose of a frame as `find` does, or None and the reason why it is not known."""
         if not frame:
-            return "the message has no frame_id"
+            return None, "the message has no frame_id"
         if not fixed:
-            return "no fixed frame is chosen"
+            return None, "no fixed frame is chosen"
         try:
-            self.find(fixed, frame, stamp)
+            return self.find(fixed, frame, stamp), ""
         except TransformError as error:
-            return str(error).strip()
-        return ""
+            return None, str(error).strip()
 
     def age(self, frame: str) -> float | None:
         """Return the seconds since the newest transform of a frame; None for a static one."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 import threading
 import time
 from array import array
@@ -25,18 +24,12 @@ _DEEPEST = 6
 _MOST_FIELDS = 200
 _MOST_ELEMENTS = 50
 _QUEUE = 200
-_COLON = re.compile(r":(?![^\[]*\])")
-"""A colon that is not in an index."""
 
 
 def split_fields(text: str) -> list[str]:
     """Return the fields that a text names; ``/pose/x:y`` stands for two, as in rqt_plot."""
-    fields: list[str] = []
-    for word in text.replace(",", " ").split():
-        first, *others = [part for part in _COLON.split(word) if part] or [word]
-        fields.append(first)
-        fields += [f"{first.rpartition('/')[0]}/{other}" for other in others]
-    return list(dict.fromkeys(fields))
+    words = text.replace(",", " ").split()
+    return list(dict.fromkeys(field for word in words for field in FieldPath.spell_out(word)))
 
 
 class Series:

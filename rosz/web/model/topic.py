@@ -10,18 +10,8 @@ from typing import Any
 
 import msgspec
 
+from rosz import introspect
 from rosz.errors import DecodeError, UsageError
-from rosz.introspect import (
-    BandwidthMeter,
-    DelayMeter,
-    DelayStats,
-    FieldPath,
-    Survey,
-    find_class,
-    find_token,
-    read_stamp,
-    topic_types,
-)
 from rosz.message import Message
 from rosz.node import Node
 from rosz.time import DurationValue, TimeValue
@@ -64,7 +54,7 @@ class FieldCondition:
                 " and a value, such as linear/x > 0.5"
             )
         path, self._operator, value = match.groups()
-        self._path = FieldPath(path.replace(".", "/"))
+        self._path = introspect.FieldPath(path.replace(".", "/"))
         self._value = value.strip("'\"")
         try:
             self._number: float | None = float(self._value)
@@ -105,10 +95,14 @@ class TopicWatch:
     """
 
     def __init__(
-        self, node: Node, survey: Survey, topic: str, condition: FieldCondition | None = None
+        self,
+        node: Node,
+        survey: introspect.Survey,
+        topic: str,
+        condition: FieldCondition | None = None,
     ) -> None:
-        types = topic_types(survey.view).get(topic, ("",))
-        token = find_token(survey.view, topic, types[0])
+        types = introspect.topic_types(survey.view).get(topic, ("",))
+        token = introspect.find_token(survey.view, topic, types[0])
         self.topic: str = topic
         self.type_name: str = token.type_name
         self.received: int = 0
@@ -116,10 +110,10 @@ class TopicWatch:
         self._now = node.now
         self._payload: bytes | None = None
         self._message: tuple[bytes, Any] | None = None
-        self._sizes = BandwidthMeter()
-        self._ages = DelayMeter(window=100)
-        self._delay: DelayStats | None = None
-        cls = find_class(node, token)
+        self._sizes = introspect.BandwidthMeter()
+        self._ages = introspect.DelayMeter(window=100)
+        self._delay: introspect.DelayStats | None = None
+        cls = introspect.find_class(node, token)
         self._stamped: bool = cls._has_header
         self._decode = node.context.decoder(cls)
         self._subscription = node.subscription(
@@ -130,7 +124,7 @@ class TopicWatch:
         self.received += 1
         self._sizes.add(len(payload), time.monotonic_ns())
         if self._stamped:
-            self._ages.add(read_stamp(payload, self.type_name), self._now())
+            self._ages.add(introspect.read_stamp(payload, self.type_name), self._now())
         if self._condition is None or self._fulfils(self._condition, payload):
             self._payload = payload
 
@@ -158,7 +152,7 @@ class TopicWatch:
         """Return rate and bandwidth; None before the second message."""
         return flow_of(self._sizes.stats(time.monotonic_ns()))
 
-    def delay(self) -> DelayStats | None:
+    def delay(self) -> introspect.DelayStats | None:
         """Return the age of messages when they arrive; None if they have no header."""
         self._delay = self._ages.stats() or self._delay
         return self._delay

@@ -8,19 +8,8 @@ from typing import Any
 from nicegui import ui
 
 from rosz.web.model import ActionRow, Actions, ActionUse, GoalRow, SentGoal, System
+from rosz.web.pages import layout
 from rosz.web.pages.form import MessageForm
-from rosz.web.pages.layout import (
-    Frame,
-    add_table,
-    address_of,
-    card,
-    column,
-    empty_state,
-    offer_choice,
-    query_of,
-    show_rows,
-    show_text,
-)
 
 _LIST_PERIOD = 1.0
 _PERIOD = 0.25
@@ -36,7 +25,7 @@ class ActionsPage:
     def __init__(self, system: System, action: str = "") -> None:
         self._system = system
         self._actions: Actions = system.actions
-        self._frame = frame = Frame(system, "Actions", "/actions")
+        self._frame = frame = layout.Frame(system, "Actions", "/actions")
         self._graph = frame.use(system.graph)
         self._rows: dict[str, ActionRow] = {}
         self._wanted = action
@@ -44,7 +33,7 @@ class ActionsPage:
         self._use: ActionUse | None = None
         self._cards: dict[SentGoal, _GoalCard] = {}
         with frame.content:
-            self._empty = empty_state(
+            self._empty = layout.empty_state(
                 "flag",
                 "No action",
                 "Nodes that serve actions appear here; a small one is in:",
@@ -69,13 +58,13 @@ class ActionsPage:
 
     def _add_table(self) -> ui.table:
         columns = [
-            column("name", "Action"),
-            column("type", "Type", "rosz-soft"),
-            column("servers", "Node", "rosz-wide"),
+            layout.column("name", "Action"),
+            layout.column("type", "Type", "rosz-soft"),
+            layout.column("servers", "Node", "rosz-wide"),
         ]
-        with card("Actions"):
-            table = add_table(columns)
-            offer_choice(table, self._choose)
+        with layout.card("Actions"):
+            table = layout.add_table(columns)
+            layout.offer_choice(table, self._choose)
         return table
 
     def _add_form(self) -> None:
@@ -101,13 +90,13 @@ class ActionsPage:
         rows = [
             {
                 "name": row.name,
-                "address": query_of("/actions", action=row.name),
+                "address": layout.query_of("/actions", action=row.name),
                 "type": row.type,
                 "servers": ", ".join(row.servers),
             }
             for row in served
         ]
-        show_rows(self._table, rows)
+        layout.show_rows(self._table, rows)
         if self._wanted in self._rows:
             wanted, self._wanted = self._wanted, ""
             ui.timer(0, lambda: self._choose(wanted), once=True)
@@ -124,7 +113,7 @@ class ActionsPage:
         self._form.clear()
         for button in (self._send_button, self._cancel_button):
             button.disable()
-        address_of(query_of("/actions", action=name))
+        layout.address_of(layout.query_of("/actions", action=name))
         view = self._graph.survey().view
         use = await self._frame.attempt(lambda: self._actions.use(view, name))
         if use is None:
@@ -209,8 +198,8 @@ class _GoalCard:
         self._state.props(f"color={_COLORS.get(goal.state, 'info')}")
         self._time.set_text(f"{goal.seconds:.1f} s")
         self._cancel.set_visibility(not goal.done)
-        show_text(self._result, goal.result)
-        show_text(self._fault, goal.fault)
+        layout.show_text(self._result, goal.result)
+        layout.show_text(self._fault, goal.fault)
         if self._seen != goal.feedbacks:
             self._seen = goal.feedbacks
             texts = goal.feedback()
@@ -228,7 +217,7 @@ class _OtherGoals:
     def __init__(self, cancel: Any) -> None:
         self._cancel = cancel
         self._shown: list[GoalRow] = []
-        with card("Other goals of the server") as self._card:
+        with layout.card("Other goals of the server") as self._card:
             self._rows = ui.column().classes("w-full gap-1")
         self._card.set_visibility(False)
 

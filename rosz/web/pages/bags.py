@@ -12,30 +12,9 @@ from nicegui import run, ui
 from rosz.bags import Summary
 from rosz.errors import RoszError
 from rosz.introspect import list_topics
-from rosz.web.model import (
-    COMPRESSIONS,
-    BagCommand,
-    BagRun,
-    Bags,
-    PlayOrder,
-    RecordOrder,
-    System,
-)
+from rosz.web.model import COMPRESSIONS, BagCommand, BagRun, Bags, PlayOrder, RecordOrder, System
+from rosz.web.pages import layout
 from rosz.web.pages.launches import confirm
-from rosz.web.pages.layout import (
-    Frame,
-    add_table,
-    address_of,
-    bandwidth_text,
-    card,
-    column,
-    number_column,
-    offer_choice,
-    query_of,
-    show_rows,
-    show_text,
-    size_text,
-)
 
 _LIST_PERIOD = 2.0
 _PERIOD = 0.25
@@ -51,7 +30,7 @@ class BagsPage:
 
     def __init__(self, system: System, bag: str = "") -> None:
         self._bags: Bags = system.bags
-        self._frame = frame = Frame(system, "Bags", "/bags")
+        self._frame = frame = layout.Frame(system, "Bags", "/bags")
         self._wanted = bag
         with (
             frame.content,
@@ -63,24 +42,24 @@ class BagsPage:
                 self._add_list()
             with ui.column().classes("gap-4 min-w-0"):
                 self._contents = _Contents(self._bags, frame, self._list)
-        offer_choice(self._table, self._contents.show)
+        layout.offer_choice(self._table, self._contents.show)
         ui.timer(_LIST_PERIOD, self._list)
         frame.every(_PERIOD, self._refresh)
 
     def _add_list(self) -> None:
         columns = [
-            column("name", "Bag", "break-all whitespace-normal"),
-            number_column("size", "Size", sort="bytes"),
-            number_column("changed", "Changed", sort="stamp"),
+            layout.column("name", "Bag", "break-all whitespace-normal"),
+            layout.number_column("size", "Size", sort="bytes"),
+            layout.number_column("changed", "Changed", sort="stamp"),
         ]
-        with card("Bags"):
+        with layout.card("Bags"):
             ui.label(str(self._bags.folder.path)).classes("rosz-mono rosz-soft break-all")
             self._fault = ui.label("").classes("text-negative")
             self._empty = ui.label(
                 "No bag is in this folder yet: record one, or start 'rosz web --bags FOLDER'."
             )
             self._empty.classes("rosz-soft").set_visibility(False)
-            self._table = add_table(columns, most=10)
+            self._table = layout.add_table(columns, most=10)
             self._table.set_visibility(False)
 
     async def _list(self) -> None:
@@ -93,15 +72,15 @@ class BagsPage:
         rows = [
             {
                 "name": row.name,
-                "address": query_of("/bags", bag=row.name),
-                "size": size_text(row.size),
+                "address": layout.query_of("/bags", bag=row.name),
+                "size": layout.size_text(row.size),
                 "bytes": row.size,
                 "changed": time.strftime("%m-%d %H:%M", time.localtime(row.changed)),
                 "stamp": row.changed,
             }
             for row in listing or ()
         ]
-        show_rows(self._table, rows)
+        layout.show_rows(self._table, rows)
         self._table.set_visibility(bool(rows))
         self._empty.set_visibility(not rows)
         if self._wanted:
@@ -116,12 +95,12 @@ class BagsPage:
 class _Recorder:
     """The card that starts a recording, shows its progress, and stops it."""
 
-    def __init__(self, system: System, frame: Frame) -> None:
+    def __init__(self, system: System, frame: layout.Frame) -> None:
         self._bags: Bags = system.bags
         self._own = system.node.name
         self._frame = frame
         self._graph = frame.use(system.graph)
-        with card("Record", "p-4 gap-3"):
+        with layout.card("Record", "p-4 gap-3"):
             with ui.column().classes("w-full gap-2") as self._form:
                 self._add_form()
             with ui.column().classes("w-full gap-2") as self._going:
@@ -215,8 +194,8 @@ class _Recorder:
         going = recording is not None and not recording.ended
         self._form.set_visibility(not going)
         self._going.set_visibility(going)
-        show_text(self._said, _said(recording))
-        show_text(self._fault, fault_of(recording))
+        layout.show_text(self._said, _said(recording))
+        layout.show_text(self._fault, fault_of(recording))
         if recording is None:
             return
         last = recording.last
@@ -224,10 +203,11 @@ class _Recorder:
         texts = {
             "Time": _clock(last.seconds),
             "Messages": f"{last.messages} ({recording.messages_per_second:.0f}/s)",
-            "Size": f"{size_text(last.size)} ({bandwidth_text(recording.bytes_per_second)})",
+            "Size": layout.size_text(last.size)
+            + f" ({layout.bandwidth_text(recording.bytes_per_second)})",
             "Lost": str(last.lost),
             "Topics": str(last.topics),
-            "Disk left": size_text(last.left),
+            "Disk left": layout.size_text(last.left),
         }
         for name, text in texts.items():
             self._facts[name].set_text(text)
@@ -240,7 +220,7 @@ class _Recorder:
 class _Transport:
     """The bar that controls the bag that plays."""
 
-    def __init__(self, bags: Bags, frame: Frame) -> None:
+    def __init__(self, bags: Bags, frame: layout.Frame) -> None:
         self._bags = bags
         self._frame = frame
         self._dragged = False
@@ -298,7 +278,7 @@ class _Transport:
         playing: BagRun | None = self._bags.playing
         going = playing is not None and not playing.ended
         self._card.set_visibility(going)
-        show_text(self._fault, fault_of(playing))
+        layout.show_text(self._fault, fault_of(playing))
         if playing is None or not going:
             return
         last, order = playing.last, playing.order.play
@@ -316,13 +296,13 @@ class _Transport:
         self._time.set_text(f"{_clock(last.seconds)} / {_clock(last.duration)}")
         self._pause.props(f"icon={'play_arrow' if last.paused else 'pause'}")
         self._step.set_enabled(last.paused)
-        show_text(self._said, playing.lines[-1] if playing.lines else "")
+        layout.show_text(self._said, playing.lines[-1] if playing.lines else "")
 
 
 class _Contents:
     """One bag: its contents, and the buttons for it."""
 
-    def __init__(self, bags: Bags, frame: Frame, changed: Callable[[], Any]) -> None:
+    def __init__(self, bags: Bags, frame: layout.Frame, changed: Callable[[], Any]) -> None:
         self._bags = bags
         self._frame = frame
         self._changed = changed
@@ -333,7 +313,7 @@ class _Contents:
     async def show(self, name: str) -> None:
         """Show a bag."""
         self._name = name
-        address_of(query_of("/bags", bag=name))
+        layout.address_of(layout.query_of("/bags", bag=name))
         self._card.clear()
         with self._card:
             ui.label(name).classes("text-base font-semibold break-all")
@@ -363,7 +343,7 @@ class _Contents:
             "Begin": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(summary.start)),
             "Duration": _clock(summary.duration),
             "Messages": str(summary.messages),
-            "Size": size_text(summary.size),
+            "Size": layout.size_text(summary.size),
             "Format": f"{summary.format} {summary.version}".strip(),
             "Compression": compression,
         }
@@ -434,7 +414,7 @@ class _Contents:
             self._card.clear()
             with self._card:
                 ui.label(f"'{name}' is deleted.").classes("rosz-soft")
-            address_of("/bags")
+            layout.address_of("/bags")
             await self._changed()
 
 

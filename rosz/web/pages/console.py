@@ -12,7 +12,7 @@ from nicegui import ui
 from rosz.errors import UsageError
 from rosz.introspect import LogFilter, LogLine, find_nodes, format_line, get_levels, set_level
 from rosz.web.model import System
-from rosz.web.pages.layout import Frame, address_of, column, empty_state, query_of, tool_button
+from rosz.web.pages import layout
 
 _PERIOD = 0.5
 _MOST = 300
@@ -77,7 +77,7 @@ class ConsolePage:
         end: str = "",
     ) -> None:
         self._system = system
-        self._frame = frame = Frame(system, "Console", "/console")
+        self._frame = frame = layout.Frame(system, "Console", "/console")
         if objection := system.permission.objection("subscribe", "/rosout"):
             frame.show_fault(objection)
             return
@@ -90,7 +90,7 @@ class ConsolePage:
         with frame.content:
             self._add_filter()
             self._table = self._add_table()
-            self._empty = empty_state(
+            self._empty = layout.empty_state(
                 "subject",
                 "No line yet",
                 "Lines appear as nodes log them. A node that logs:",
@@ -123,18 +123,18 @@ class ConsolePage:
                 )
                 self._inputs[field].props(f"dense debounce=300 {props}").classes("w-28")
             ui.space()
-            self._pause = tool_button("Pause", "pause", self._toggle)
-            tool_button("Clear", "delete_sweep", self._clear)
-            tool_button("Save", "download", self._save)
-            tool_button("Levels", "tune", self._show_levels)
+            self._pause = layout.tool_button("Pause", "pause", self._toggle)
+            layout.tool_button("Clear", "delete_sweep", self._clear)
+            layout.tool_button("Save", "download", self._save)
+            layout.tool_button("Levels", "tune", self._show_levels)
 
     def _add_table(self) -> ui.table:
         columns = [
-            column("level", "Level"),
-            column("text", "Message"),
-            column("node", "Node", "rosz-wide"),
-            column("time", "Time", "rosz-wide rosz-number"),
-            column("place", "Place", "rosz-wide rosz-soft"),
+            layout.column("level", "Level"),
+            layout.column("text", "Message"),
+            layout.column("node", "Node", "rosz-wide"),
+            layout.column("time", "Time", "rosz-wide rosz-number"),
+            layout.column("place", "Place", "rosz-wide rosz-soft"),
         ]
         table = ui.table(rows=[], columns=columns, row_key="id").classes("rosz-card w-full")
         table.props('flat dense virtual-scroll :rows-per-page-options="[0]"')
@@ -157,7 +157,7 @@ class ConsolePage:
             for name, value in msgspec.structs.asdict(self._choice).items()
             if value != getattr(_Wanted(), name)
         }
-        address_of(query_of("/console", **given))
+        layout.address_of(layout.query_of("/console", **given))
         self._shown = None
         self._refresh()
 
@@ -199,7 +199,7 @@ class ConsolePage:
                 "level": line.level,
                 "text": line.text,
                 "node": line.node,
-                "address": query_of("/console", node=line.node),
+                "address": layout.query_of("/console", node=line.node),
                 "time": time.strftime("%H:%M:%S", time.localtime(line.stamp))
                 + f".{line.stamp % 1 * 1000:03.0f}"[:4],
                 "place": f"{line.file.rpartition('/')[2]}:{line.line}",

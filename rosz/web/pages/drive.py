@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from nicegui import ui
 from nicegui.events import GenericEventArguments, KeyEventArguments
 
@@ -9,7 +11,7 @@ from rosz.errors import RoszError
 from rosz.introspect import list_topics
 from rosz.turtlesim import fetch
 from rosz.web.model import FloorPlan, System, VelocityPublisher, find_floor
-from rosz.web.pages.layout import Frame, add_select, address_of, card, offer_options, query_of
+from rosz.web.pages import layout
 
 _LIST_PERIOD = 1.0
 _PICTURE_PERIOD = 0.1
@@ -25,22 +27,7 @@ _KEYS = {
     "a": (0, 1),
     "d": (0, -1),
 }
-_HEARTBEAT = """
-if (!window.roszDrives) {
-  window.roszDrives = setInterval(() => emitEvent('rosz-alive'), 200);
-  for (const name of ['blur', 'pagehide']) {
-    window.addEventListener(name, () => emitEvent('rosz-release'));
-  }
-  let moved = false;
-  setInterval(() => {
-    const pad = navigator.getGamepads().find((one) => one !== null && one.axes.length >= 2);
-    if (!pad) return;
-    const stick = [pad.axes[0], pad.axes[1]].map((one) => Math.abs(one) < 0.12 ? 0 : one);
-    const moves = stick.some((one) => one !== 0);
-    if (moves || moved) emitEvent('rosz-gamepad', stick);
-    moved = moves;
-  }, 50);
-}"""
+_HEARTBEAT = Path(__file__).with_name("heartbeat.js")
 
 
 class DrivePage:
@@ -48,7 +35,7 @@ class DrivePage:
 
     def __init__(self, system: System, topic: str = "") -> None:
         self._system = system
-        frame = Frame(system, "Drive", "/drive")
+        frame = layout.Frame(system, "Drive", "/drive")
         self._graph = frame.use(system.graph)
         self._driver: VelocityPublisher | None = None
         self._held: set[str] = set()
@@ -57,7 +44,7 @@ class DrivePage:
         self._floor: FloorPlan | None = None
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-4 px-3 py-2"):
-                self._select = add_select(
+                self._select = layout.add_select(
                     "Topic (Twist)",
                     topic,
                     self._choose,
@@ -71,16 +58,16 @@ class DrivePage:
                 )
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
                 self._add_pad()
-                with card("From above") as self._floor_card:
+                with layout.card("From above") as self._floor_card:
                     self._floor_text = ui.label("").classes("rosz-soft text-sm")
                     self._floor_picture = ui.html("", sanitize=False).classes("w-full")
-                with card("turtlesim") as self._card:
+                with layout.card("turtlesim") as self._card:
                     self._image = ui.interactive_image().classes("w-full")
         ui.keyboard(on_key=self._key, repeating=False)
         ui.on("rosz-alive", self._live)
         ui.on("rosz-release", self._release)
         ui.on("rosz-gamepad", self._tilt)
-        ui.run_javascript(_HEARTBEAT)
+        ui.run_javascript(_HEARTBEAT.read_text())
         frame.keep(self)
         frame.every(_LIST_PERIOD, self._list)
         if topic:
@@ -126,7 +113,7 @@ class DrivePage:
             for entry in list_topics(survey.view.tokens)
             if _TWIST in entry.types and entry.subscribers
         ]
-        options = offer_options(self._select, topics)
+        options = layout.offer_options(self._select, topics)
         if not self._select.value and options:
             self._select.set_value(options[0])
         turtles = any("turtlesim/srv/Spawn" in types for types in survey.view.services().values())
@@ -152,7 +139,7 @@ class DrivePage:
         self._close_driver()
         if not topic:
             return
-        address_of(query_of("/drive", topic=topic))
+        layout.address_of(layout.query_of("/drive", topic=topic))
         try:
             self._driver = VelocityPublisher(self._system.node, self._system.permission, topic)
             self._fault.set_text("")

@@ -10,7 +10,7 @@ from nicegui.elements.mixins.value_element import ValueElement
 
 from rosz.node import Node
 from rosz.web.model import Form, FormField
-from rosz.web.pages.layout import show_text
+from rosz.web.pages import layout
 
 _FEW = 12
 """Number of fields up to which a form shows all of them at once."""
@@ -44,7 +44,7 @@ class MessageForm:
         self._editors.clear()
         self._box.clear()
         self._set_text("")
-        show_text(self._fault, "")
+        layout.show_text(self._fault, "")
 
     def show(self, cls: type[Any]) -> None:
         """Show the fields of a message class with their default values."""
@@ -121,7 +121,7 @@ class MessageForm:
         if self._own or self._form is None or value is None:
             return
         fault = self._form.change(field, value, self._node.now())
-        show_text(self._fault, fault)
+        layout.show_text(self._fault, fault)
         if not fault:
             self._set_text(self._form.text)
 
@@ -129,7 +129,7 @@ class MessageForm:
         if self._own or self._form is None:
             return
         self._form.write(text, self._node.now())
-        show_text(self._fault, self._form.fault)
+        layout.show_text(self._fault, self._form.fault)
         if not self._form.fault:
             self._quietly(self._show_values)
 

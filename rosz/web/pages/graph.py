@@ -11,28 +11,12 @@ import msgspec
 from nicegui import background_tasks, run, ui
 from nicegui.events import GenericEventArguments
 
-from rosz.diagram import (
-    CONTENTS,
-    Content,
-    Picture,
-    PictureOptions,
-    labels_of,
-    make_picture,
-    write_dot,
-    write_svg,
-)
+from rosz import diagram
 from rosz.errors import RoszError
 from rosz.introspect import Survey, find_nodes, format_node, format_topic
 from rosz.names import short_type
 from rosz.web.model import System, Traffic
-from rosz.web.pages.layout import (
-    Frame,
-    address_of,
-    empty_state,
-    query_of,
-    short_rate_text,
-    tool_button,
-)
+from rosz.web.pages import layout
 
 _PERIOD = 0.05
 """Seconds between two updates; one without a change costs nearly nothing."""
@@ -65,7 +49,7 @@ _RELABEL = """(labels) => {
 class _DrawnGraph(NamedTuple):
     """The state of the drawing; the chosen box is emphasised."""
 
-    picture: Picture
+    picture: diagram.Picture
     written: tuple[str, ...]
     chosen: str
 
@@ -96,15 +80,19 @@ class GraphPage:
         labels: str = "rates",
         pick: str = "",
     ) -> None:
-        shown: Content = next((kind for kind in CONTENTS if kind == content), "nodes")
-        options = PictureOptions(content=shown, nodes=nodes, topics=topics, group=max(0, group))
+        shown: diagram.Content = next(
+            (kind for kind in diagram.CONTENTS if kind == content), "nodes"
+        )
+        options = diagram.PictureOptions(
+            content=shown, nodes=nodes, topics=topics, group=max(0, group)
+        )
         if hide != _USUAL:
             hidden = set(hide.split(","))
             switches = {name: name.removeprefix("hide_") in hidden for name in _SWITCHES}
             options = msgspec.structs.replace(options, **switches)
         self._options = options
         self._written = tuple(choice for choice in _LABELS if choice in labels.split(","))
-        self._frame = frame = Frame(system, "Graph", "/graph")
+        self._frame = frame = layout.Frame(system, "Graph", "/graph")
         self._system = system
         self._watch = frame.use(system.graph)
         self._traffic: Traffic = frame.use(system.traffic)
@@ -114,13 +102,13 @@ class GraphPage:
         self._drawn: _DrawnGraph | None = None
         self._draws = False
         self._labels: dict[int, str] = {}
-        self._picture = Picture()
+        self._picture = diagram.Picture()
         self._chosen = pick
         self._described = not pick
         self._zoom = 100
         with frame.content:
             self._add_choices()
-            self._empty = empty_state(
+            self._empty = layout.empty_state(
                 "hub",
                 "Nothing to draw",
                 "No node matches, or none runs. Start a node:",
@@ -161,10 +149,14 @@ class GraphPage:
                     ui.button(icon=icon, on_click=lambda step=step: self._scale(step)).props(
                         f'flat dense round aria-label="{label}"'
                     )
-            tool_button("SVG", "download", lambda: self._save(write_svg, "graph.svg"))
-            tool_button("DOT", "download", lambda: self._save(write_dot, "graph.dot"))
+            layout.tool_button(
+                "SVG", "download", lambda: self._save(diagram.write_svg, "graph.svg")
+            )
+            layout.tool_button(
+                "DOT", "download", lambda: self._save(diagram.write_dot, "graph.dot")
+            )
 
-    def _save(self, write: Callable[[Picture], str], name: str) -> None:
+    def _save(self, write: Callable[[diagram.Picture], str], name: str) -> None:
         ui.download.content(write(self._picture), name)
 
     def _add_options(self) -> None:
@@ -203,7 +195,7 @@ class GraphPage:
         self._refresh()
 
     def _show_address(self) -> None:
-        options, usual = self._options, PictureOptions()
+        options, usual = self._options, diagram.PictureOptions()
         query = {
             name: str(getattr(options, name))
             for name in ("content", "nodes", "topics", "group")
@@ -214,7 +206,7 @@ class GraphPage:
             query["hide"] = ",".join(name.removeprefix("hide_") for name in hidden)
         if self._written != ("rates",):
             query["labels"] = ",".join(self._written)
-        address_of(query_of("/graph", **query, pick=self._chosen))
+        layout.address_of(layout.query_of("/graph", **query, pick=self._chosen))
 
     def _choose_label(self, name: str, *, shown: bool) -> None:
         self._written = tuple(
@@ -240,7 +232,7 @@ class GraphPage:
         self._traffic.update(survey)
         if wanted != self._wanted:
             tokens = [t for t in survey.view.tokens if t.node_name != self._system.node.name]
-            self._picture = make_picture(tokens, self._options)
+            self._picture = diagram.make_picture(tokens, self._options)
         self._wanted, self._due = wanted, now + _RATES_PERIOD
         self._empty.set_visibility(not self._picture.boxes and self._watch.complete)
         self._card.set_visibility(bool(self._picture.boxes))
@@ -255,7 +247,7 @@ class GraphPage:
             if not self._draws:
                 background_tasks.create(self._draw())
         elif self._drawn is self._shown:
-            labels = dict(enumerate(labels_of(self._picture, flows)))
+            labels = dict(enumerate(diagram.labels_of(self._picture, flows)))
             changed = dict(labels.items() - self._labels.items())
             if changed:
                 self._labels.update(changed)
@@ -271,10 +263,10 @@ class GraphPage:
             while (shown := self._shown) is not self._drawn and shown is not None:
                 flows = self._flows()
                 async with self._system.drawing:
-                    text = await run.io_bound(write_svg, shown.picture, flows, shown.chosen)
+                    text = await run.io_bound(diagram.write_svg, shown.picture, flows, shown.chosen)
                 if text is None or self._drawing.is_deleted:
                     return
-                self._labels = dict(enumerate(labels_of(shown.picture, flows)))
+                self._labels = dict(enumerate(diagram.labels_of(shown.picture, flows)))
                 self._drawing.set_content(text if shown.picture.boxes else "")
                 self._drawn = shown
         finally:
@@ -287,7 +279,7 @@ class GraphPage:
         flows = {}
         for topic in topics:
             flow = self._traffic.flow(topic) if "rates" in self._written else None
-            parts = [] if flow is None else [short_rate_text(flow.rate)]
+            parts = [] if flow is None else [layout.short_rate_text(flow.rate)]
             parts += map(short_type, types.get(topic, ()))
             if parts:
                 flows[topic] = " ".join(parts)
@@ -312,7 +304,7 @@ class GraphPage:
             ui.label(text).classes("rosz-mono whitespace-pre-wrap break-all")
             with ui.row().classes("w-full justify-end"):
                 if kind == "topic":
-                    ui.link("Open the topic", query_of("/topics", topic=name))
+                    ui.link("Open the topic", layout.query_of("/topics", topic=name))
                 ui.button("Close", on_click=dialog.close).props("flat no-caps")
         dialog.on("hide", dialog.delete)
 

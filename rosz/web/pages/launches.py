@@ -9,18 +9,7 @@ from nicegui.events import GenericEventArguments
 
 from rosz.launch.run import NodeStatus
 from rosz.web.model import Launches, NodeOutput, RunningLaunch, System
-from rosz.web.pages.layout import (
-    Frame,
-    add_table,
-    column,
-    duration_text,
-    number_column,
-    query_of,
-    show_rows,
-    show_text,
-    size_text,
-    tool_button,
-)
+from rosz.web.pages import layout
 
 _Action: TypeAlias = Literal["restart", "stop"]
 
@@ -48,7 +37,7 @@ _KINDS = {"running": "good", "failed": "bad", "ended": "soft"}
 class LaunchCards:
     """A card for each running launch."""
 
-    def __init__(self, frame: Frame, launches: Launches) -> None:
+    def __init__(self, frame: layout.Frame, launches: Launches) -> None:
         self._frame = frame
         self._launches = launches
         self._tables: dict[str, ui.table] = {}
@@ -60,7 +49,7 @@ class LaunchCards:
     def update(self) -> None:
         """Show what runs now."""
         launches = {running.key: running for running in self._launches.found or ()}
-        show_text(self._fault, self._launches.fault)
+        layout.show_text(self._fault, self._launches.fault)
         self._box.set_visibility(bool(launches or self._launches.fault))
         for key in self._cards.keys() - launches:
             self._cards.pop(key).delete()
@@ -69,7 +58,7 @@ class LaunchCards:
             if key not in self._cards:
                 self._add(launch)
             rows = [_row(launch, node) for node in launch.status.nodes]
-            show_rows(self._tables[key], rows)
+            layout.show_rows(self._tables[key], rows)
 
     def _add(self, launch: RunningLaunch) -> None:
         status = launch.status
@@ -79,18 +68,18 @@ class LaunchCards:
                 ui.label(files).classes("text-base font-semibold").tooltip(", ".join(status.files))
                 ui.label(f"launch {status.pid} on {status.host}").classes("rosz-soft text-sm")
             columns = [
-                column("name", "Node"),
-                column("state", "State"),
-                column("buttons", ""),
-                column("type", "Type", "rosz-wide rosz-soft"),
-                number_column("pid", "Process", "rosz-wide"),
-                number_column("restarts", "Restarts", "rosz-wide"),
-                number_column("cpu", "CPU"),
-                number_column("memory", "Memory"),
-                number_column("uptime", "Running for", "rosz-wide"),
-                column("machine", "Machine", "rosz-wide"),
+                layout.column("name", "Node"),
+                layout.column("state", "State"),
+                layout.column("buttons", ""),
+                layout.column("type", "Type", "rosz-wide rosz-soft"),
+                layout.number_column("pid", "Process", "rosz-wide"),
+                layout.number_column("restarts", "Restarts", "rosz-wide"),
+                layout.number_column("cpu", "CPU"),
+                layout.number_column("memory", "Memory"),
+                layout.number_column("uptime", "Running for", "rosz-wide"),
+                layout.column("machine", "Machine", "rosz-wide"),
             ]
-            table = add_table(columns, most=20)
+            table = layout.add_table(columns, most=20)
         table.add_slot("body-cell-name", _NAME_CELL)
         table.add_slot("body-cell-state", _STATE_CELL)
         table.add_slot("body-cell-buttons", _BUTTONS_CELL)
@@ -111,7 +100,7 @@ class LaunchCards:
 
 
 async def _act(
-    frame: Frame, launches: Launches, launch: RunningLaunch, action: _Action, name: str
+    frame: layout.Frame, launches: Launches, launch: RunningLaunch, action: _Action, name: str
 ) -> bool:
     """Restart or stop a node, unless the user takes it back; return whether to go on."""
     text = launches.describe(launch, name, action)
@@ -142,7 +131,7 @@ def _row(launch: RunningLaunch, node: NodeStatus) -> dict[str, Any]:
     runs = bool(node.pid)
     return {
         "name": node.name,
-        "address": query_of("/output", node=node.name),
+        "address": layout.query_of("/output", node=node.name),
         "members": ", ".join(node.members),
         "state": node.state,
         "kind": _KINDS.get(node.state, "busy"),
@@ -151,8 +140,8 @@ def _row(launch: RunningLaunch, node: NodeStatus) -> dict[str, Any]:
         "pid": node.pid or "—",
         "restarts": node.restarts,
         "cpu": f"{share:.0%}" if runs and share is not None else "—",
-        "memory": size_text(node.memory) if runs else "—",
-        "uptime": duration_text(node.uptime) if runs else "—",
+        "memory": layout.size_text(node.memory) if runs else "—",
+        "uptime": layout.duration_text(node.uptime) if runs else "—",
         "machine": node.machine,
     }
 
@@ -161,7 +150,7 @@ class OutputPage:
     """The newest lines of the output of a node, by its full name, and the buttons."""
 
     def __init__(self, system: System, node: str = "") -> None:
-        self._frame = frame = Frame(system, "Output", "/")
+        self._frame = frame = layout.Frame(system, "Output", "/")
         if not system.permission.sees_launches:
             frame.show_fault("the rules of this machine do not let this page see launches")
             return
@@ -181,8 +170,8 @@ class OutputPage:
             self._state = ui.label("").classes("rosz-soft")
             ui.space()
             self._pause = ui.switch("Pause").props("dense")
-            tool_button("Restart", "restart_alt", lambda: self._act("restart"))
-            tool_button("Stop", "stop", lambda: self._act("stop"))
+            layout.tool_button("Restart", "restart_alt", lambda: self._act("restart"))
+            layout.tool_button("Stop", "stop", lambda: self._act("stop"))
         self._empty = ui.label("It has written nothing yet.").classes("rosz-soft")
         self._log = (
             ui.log(max_lines=_LINES)
@@ -201,7 +190,7 @@ class OutputPage:
         parts = [] if status is None else [status.state, status.detail]
         parts.append(self._output.state)
         if self._output.skipped:
-            parts.append(f"{size_text(self._output.skipped)} left out")
+            parts.append(f"{layout.size_text(self._output.skipped)} left out")
         self._state.set_text(" · ".join(part for part in parts if part))
         if self._pause.value:
             return

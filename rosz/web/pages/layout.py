@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 from urllib.parse import urlencode
 
@@ -54,54 +55,7 @@ ENTRIES = (
 )
 """The pages, in the order of the navigation."""
 
-_STYLE = """
-:root { --rosz-line: #d9dee7; --rosz-soft: #5b6577; --rosz-card: #ffffff; --rosz-scene: #e9edf4; }
-body { background: #f4f6fa; }
-.nicegui-content { padding: 0; }
-body.body--dark { color-scheme: dark; }
-body.body--dark { background: #12151c; --rosz-line: #2c3340; --rosz-soft: #9aa5b8;
-  --rosz-card: #1a1f29; --rosz-scene: #1b202a; }
-.rosz-card { background: var(--rosz-card); border: 1px solid var(--rosz-line);
-  border-radius: 10px; box-shadow: none; }
-.rosz-soft { color: var(--rosz-soft); }
-.rosz-mono { font-family: ui-monospace, 'DejaVu Sans Mono', monospace; font-size: .84rem; }
-.rosz-indent { border-left: 2px solid var(--rosz-line); padding-left: .75rem; }
-.q-item.rosz-group { padding: 4px 0; min-height: 36px; }
-.rosz-number { font-variant-numeric: tabular-nums; }
-.q-table th { color: var(--rosz-soft); font-weight: 600; }
-.rosz-nav.q-item { border-radius: 8px; margin: 2px 8px; min-height: 40px; }
-body .rosz-nav.q-item { color: inherit; }
-.q-drawer { background: var(--rosz-card) !important; }
-body.body--dark .q-btn.text-primary, body.body--dark .q-icon.text-primary {
-  --q-primary: #9dbcff; }
-body .rosz-nav.rosz-here { background: #2456c81c; color: #2456c8; font-weight: 600; }
-body.body--dark .rosz-nav.rosz-here { background: #6b9bff26; color: #9dbcff; }
-body.body--dark .text-negative { color: #ff8f88 !important; }
-a { color: #2456c8; } body.body--dark a { color: #9dbcff; }
-:focus-visible { outline: 2px solid #6b9bff; outline-offset: 1px; }
-.q-table__card { background: transparent; box-shadow: none; }
-.q-table__card.rosz-card { background: var(--rosz-card); }
-.rosz-value { color: #1f6f4a; } body.body--dark .rosz-value { color: #7fd1a6; }
-.rosz-state-good { color: #1f8a5b; } .rosz-state-bad { color: #c8342b; }
-.rosz-state-busy { color: #b7791f; } .rosz-state-soft { color: var(--rosz-soft); }
-body.body--dark .rosz-state-good { color: #7fd1a6; }
-body.body--dark .rosz-state-bad { color: #ff8f87; }
-.rosz-level-DEBUG { background: #6b7689; } .rosz-level-INFO { background: #2b6cb0; }
-.rosz-level-WARN { background: #a86a10; } .rosz-level-ERROR { background: #c8342b; }
-.rosz-level-FATAL { background: #7b1fa2; }
-.rosz-graph { --graph-back: var(--rosz-card); --graph-soft: var(--rosz-soft); width: max-content; }
-body.body--dark .rosz-graph { --graph-text: #e6eaf2; --graph-node: #22345c;
-  --graph-node-line: #6b9bff; --graph-topic: #33301f; --graph-topic-line: #b59c55;
-  --graph-line: #75819a; }
-.rosz-label { font-size: 12px; color: var(--q-dark); white-space: nowrap; pointer-events: none;
-  text-shadow: 0 0 3px var(--rosz-scene), 0 0 3px var(--rosz-scene), 0 0 3px var(--rosz-scene); }
-body.body--dark .rosz-label { color: #e6eaf2; }
-.rosz-card .rosz-chart { height: 60vh; }
-.rosz-scene { height: calc(100vh - 190px); min-height: 320px; }
-@media (min-width: 600px) { .rosz-narrow { display: none !important; } }
-@media (max-width: 599px) { .rosz-scene { height: 58vh; } .rosz-card .rosz-chart { height: 46vh; }
-  .rosz-wide { display: none !important; } }
-"""
+_STYLE = Path(__file__).with_name("style.css")
 
 
 class Frame:

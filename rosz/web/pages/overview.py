@@ -8,31 +8,11 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from rosz import introspect
 from rosz.errors import NotFoundError
-from rosz.introspect import (
-    NodeEntry,
-    Survey,
-    Topic,
-    find_nodes,
-    kill,
-    list_nodes,
-    list_topics,
-    machines,
-)
 from rosz.web.model import Findings, System, Traffic
+from rosz.web.pages import layout
 from rosz.web.pages.launches import LaunchCards, confirm
-from rosz.web.pages.layout import (
-    Frame,
-    add_table,
-    bandwidth_text,
-    column,
-    duration_text,
-    empty_state,
-    number_column,
-    query_of,
-    rate_text,
-    show_rows,
-)
 from rosz.wire import Kind
 
 _PERIOD = 1.0
@@ -45,13 +25,13 @@ _LINK_CELL = """<q-td :props="props"><a :href="props.row.address">{{ props.value
 
 def show_overview(system: System) -> None:
     """Build the page."""
-    frame = Frame(system, "Overview", "/")
+    frame = layout.Frame(system, "Overview", "/")
     graph, traffic = frame.use(system.graph), frame.use(system.traffic)
     findings = frame.use(system.findings)
     with frame.content:
         tiles = _Tiles()
         doctor = _Doctor(findings)
-        empty = empty_state(
+        empty = layout.empty_state(
             "rocket_launch",
             "No node runs on this network",
             "Start a launch file, a node or an example; it appears here at once:",
@@ -95,14 +75,16 @@ class _Tiles:
                         )
                         ui.label(name).classes("rosz-soft text-sm")
 
-    def update(self, survey: Survey, own: str, findings: Findings) -> None:
-        nodes = [node for node in list_nodes(survey) if node.name != own]
-        topics = list_topics(token for token in survey.view.tokens if token.node_name != own)
+    def update(self, survey: introspect.Survey, own: str, findings: Findings) -> None:
+        nodes = [node for node in introspect.list_nodes(survey) if node.name != own]
+        topics = introspect.list_topics(
+            token for token in survey.view.tokens if token.node_name != own
+        )
         shown = findings.found
         for name, value in (
             ("Nodes", str(len(nodes))),
             ("Topics", str(len(topics))),
-            ("Machines", str(len(machines(nodes)))),
+            ("Machines", str(len(introspect.machines(nodes)))),
             ("Findings", "…" if shown is None else str(len(shown))),
         ):
             self._labels[name].set_text(value)
@@ -142,10 +124,10 @@ class _Doctor:
 class _Tables:
     """The tables of nodes and topics."""
 
-    def __init__(self, frame: Frame, traffic: Traffic) -> None:
+    def __init__(self, frame: layout.Frame, traffic: Traffic) -> None:
         self._frame = frame
         self._traffic = traffic
-        self._survey: Survey
+        self._survey: introspect.Survey
         self._box = ui.column().classes("w-full gap-4")
         with self._box:
             self._add_topics()
@@ -168,15 +150,15 @@ class _Tables:
                 ui.label("measure all").classes("rosz-soft text-sm -ml-2")
                 search = ui.input(placeholder="Filter").props("dense clearable").classes("w-40")
             columns = [
-                column("name", "Topic"),
-                column("type", "Type", "rosz-wide rosz-soft"),
-                number_column("rate", "Rate", sort="rate_value"),
-                number_column("bandwidth", "Bandwidth", sort="bandwidth_value"),
-                number_column("latency", "Latency", "rosz-wide", sort="latency_value"),
-                number_column("publishers", "Pub", "rosz-wide"),
-                number_column("subscribers", "Sub", "rosz-wide"),
+                layout.column("name", "Topic"),
+                layout.column("type", "Type", "rosz-wide rosz-soft"),
+                layout.number_column("rate", "Rate", sort="rate_value"),
+                layout.number_column("bandwidth", "Bandwidth", sort="bandwidth_value"),
+                layout.number_column("latency", "Latency", "rosz-wide", sort="latency_value"),
+                layout.number_column("publishers", "Pub", "rosz-wide"),
+                layout.number_column("subscribers", "Sub", "rosz-wide"),
             ]
-            self.topics = add_table(columns, most=_ROWS)
+            self.topics = layout.add_table(columns, most=_ROWS)
             self.topics.add_slot("body-cell-name", _LINK_CELL)
             search.on_value_change(
                 lambda change: setattr(self.topics, "filter", change.value or "")
@@ -186,13 +168,13 @@ class _Tables:
         with ui.column().classes("rosz-card w-full p-0 gap-0"):
             ui.label("Nodes").classes("text-base font-semibold px-4 pt-3")
             columns = [
-                column("name", "Node"),
-                column("buttons", ""),
-                column("host", "Machine"),
-                number_column("pid", "Process"),
-                number_column("since", "Running for", "rosz-wide"),
+                layout.column("name", "Node"),
+                layout.column("buttons", ""),
+                layout.column("host", "Machine"),
+                layout.number_column("pid", "Process"),
+                layout.number_column("since", "Running for", "rosz-wide"),
             ]
-            self.nodes = add_table(columns, "key", _ROWS)
+            self.nodes = layout.add_table(columns, "key", _ROWS)
         self.nodes.add_slot("body-cell-name", _LINK_CELL)
         self.nodes.add_slot("body-cell-buttons", _KILL_CELL)
         self.nodes.on("kill", self._kill)
@@ -201,12 +183,12 @@ class _Tables:
         with ui.column().classes("rosz-card w-full p-0 gap-0"):
             ui.label("Machines").classes("text-base font-semibold px-4 pt-3")
             columns = [
-                column("name", "Machine"),
-                number_column("nodes", "Nodes"),
-                number_column("processes", "Processes"),
-                number_column("topics", "Topics published"),
+                layout.column("name", "Machine"),
+                layout.number_column("nodes", "Nodes"),
+                layout.number_column("processes", "Processes"),
+                layout.number_column("topics", "Topics published"),
             ]
-            self.machines = add_table(columns, most=_ROWS)
+            self.machines = layout.add_table(columns, most=_ROWS)
 
     async def _kill(self, event: GenericEventArguments) -> None:
         name, key = event.args["name"], event.args["key"]
@@ -215,56 +197,56 @@ class _Tables:
 
         def act() -> None:
             system.permission.check_control(f"control '{name}'")
-            tokens = find_nodes(self._survey, name)
+            tokens = introspect.find_nodes(self._survey, name)
             running = [token for token in tokens if key.startswith(f"{name} {token.zid} ")]
             if not running:
                 raise NotFoundError(f"this process of node '{name}' has ended already")
             for token in running:
-                kill(session, token, "ended from a page")
+                introspect.kill(session, token, "ended from a page")
 
         with self._box:
             text = "It is asked to shut down, as by rosnode kill. A launch may start it again."
             if await confirm(f"End {name}?", text, "end"):
                 await self._frame.attempt(act, f"{name} has ended")
 
-    def update(self, survey: Survey, own: str) -> int:
+    def update(self, survey: introspect.Survey, own: str) -> int:
         """Show what there is, and return the number of nodes."""
         self._survey = survey
         topics = [
             self._topic_row(topic)
-            for topic in list_topics(t for t in survey.view.tokens if t.node_name != own)
+            for topic in introspect.list_topics(t for t in survey.view.tokens if t.node_name != own)
         ]
-        entries = [entry for entry in list_nodes(survey) if entry.name != own]
+        entries = [entry for entry in introspect.list_nodes(survey) if entry.name != own]
         now = time.time()
         nodes = [
             {
                 "key": f"{entry.name} {entry.session} {entry.pid}",
                 "name": entry.name,
-                "address": query_of(
+                "address": layout.query_of(
                     "/graph", content="all", nodes=entry.name, pick=f"node:{entry.name}"
                 ),
                 "host": entry.host or "—",
                 "pid": entry.pid or "—",
-                "since": duration_text(now - entry.started / 1e9) if entry.started else "—",
+                "since": layout.duration_text(now - entry.started / 1e9) if entry.started else "—",
             }
             for entry in entries
         ]
-        show_rows(self.topics, topics)
-        show_rows(self.nodes, nodes)
-        show_rows(self.machines, _machine_rows(survey, entries))
+        layout.show_rows(self.topics, topics)
+        layout.show_rows(self.nodes, nodes)
+        layout.show_rows(self.machines, _machine_rows(survey, entries))
         self._box.set_visibility(bool(nodes))
         return len(nodes)
 
-    def _topic_row(self, topic: Topic) -> dict[str, Any]:
+    def _topic_row(self, topic: introspect.Topic) -> dict[str, Any]:
         flow = self._traffic.flow(topic.name)
         latency = None if flow is None else flow.latency
         return {
             "name": topic.name,
-            "address": query_of("/topics", topic=topic.name),
+            "address": layout.query_of("/topics", topic=topic.name),
             "type": topic.type_text,
-            "rate": "—" if flow is None else rate_text(flow.rate),
+            "rate": "—" if flow is None else layout.rate_text(flow.rate),
             "rate_value": -1.0 if flow is None else round(flow.rate, 1),
-            "bandwidth": "—" if flow is None else bandwidth_text(flow.bandwidth),
+            "bandwidth": "—" if flow is None else layout.bandwidth_text(flow.bandwidth),
             "bandwidth_value": -1.0 if flow is None else round(flow.bandwidth),
             "latency": "—" if latency is None else f"{latency * 1e3:.1f} ms",
             "latency_value": -1.0 if latency is None else round(latency, 4),
@@ -273,7 +255,9 @@ class _Tables:
         }
 
 
-def _machine_rows(survey: Survey, nodes: list[NodeEntry]) -> list[dict[str, Any]]:
+def _machine_rows(
+    survey: introspect.Survey, nodes: list[introspect.NodeEntry]
+) -> list[dict[str, Any]]:
     published: dict[str, set[str]] = {}
     for token in survey.view.entities(Kind.PUBLISHER):
         published.setdefault(survey.host(token), set()).add(token.name)
@@ -284,5 +268,5 @@ def _machine_rows(survey: Survey, nodes: list[NodeEntry]) -> list[dict[str, Any]
             "processes": len({node.pid for node in nodes if node.host == host}),
             "topics": len(published.get(host, ())),
         }
-        for host in machines(nodes)
+        for host in introspect.machines(nodes)
     ]

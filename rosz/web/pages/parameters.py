@@ -12,7 +12,7 @@ from rosz.errors import YamlError
 from rosz.params import Value, type_name
 from rosz.params.yaml import inline
 from rosz.web.model import System
-from rosz.web.pages.layout import Frame, address_of, card, empty_state, query_of, tool_button
+from rosz.web.pages import layout
 
 _PERIOD = 0.5
 _LONGEST = 120
@@ -33,7 +33,7 @@ class ParametersPage:
     """
 
     def __init__(self, system: System, prefix: str = "", name: str = "") -> None:
-        self._frame = frame = Frame(system, "Parameters", "/parameters")
+        self._frame = frame = layout.Frame(system, "Parameters", "/parameters")
         self._parameters = frame.use(system.parameters)
         self._values: dict[str, Value] = {}
         self._seen: object = None
@@ -42,7 +42,7 @@ class ParametersPage:
         self._wanted = name
         with frame.content:
             self._add_tools(prefix)
-            self._empty = empty_state(
+            self._empty = layout.empty_state(
                 "tune",
                 "No parameter is set",
                 "Nodes and launch files set them, and so does:",
@@ -61,7 +61,7 @@ class ParametersPage:
                         .classes("w-full")
                     )
                     self._tree.add_slot("default-header", _HEADER)
-                with card("Changes since this page looked"):
+                with layout.card("Changes since this page looked"):
                     self._changes = ui.column().classes("w-full gap-2")
         frame.every(_PERIOD, self._refresh)
 
@@ -72,11 +72,11 @@ class ParametersPage:
                 .props("dense clearable debounce=300")
                 .classes("grow min-w-40")
             )
-            tool_button("New", "add", lambda: self._edit(""))
-            tool_button("Save", "download", self._save)
+            layout.tool_button("New", "add", lambda: self._edit(""))
+            layout.tool_button("Save", "download", self._save)
             upload = ui.upload(on_upload=self._load, auto_upload=True).classes("hidden")
             upload.props('accept=".yaml,.yml"')
-            tool_button("Load", "upload", lambda: upload.run_method("pickFiles"))
+            layout.tool_button("Load", "upload", lambda: upload.run_method("pickFiles"))
 
     def _filter(self) -> None:
         self._show_address()
@@ -84,7 +84,7 @@ class ParametersPage:
 
     def _show_address(self) -> None:
         prefix = str(self._search.value or "")
-        address_of(query_of("/parameters", prefix=prefix, name=self._chosen))
+        layout.address_of(layout.query_of("/parameters", prefix=prefix, name=self._chosen))
 
     def _refresh(self) -> None:
         wanted = self._search.value or ""

@@ -11,14 +11,7 @@ from nicegui.elements.mixins.value_element import ValueElement
 from rosz.errors import RoszError
 from rosz.reconfigure import Config, Description, Group, Setting, find_servers
 from rosz.web.model import Reconfiguration, System
-from rosz.web.pages.layout import (
-    Frame,
-    add_select,
-    address_of,
-    empty_state,
-    offer_options,
-    query_of,
-)
+from rosz.web.pages import layout
 
 _LIST_PERIOD = 1.0
 _PERIOD = 0.1
@@ -31,7 +24,7 @@ class ReconfigurePage:
 
     def __init__(self, system: System, server: str = "") -> None:
         self._system = system
-        self._frame = frame = Frame(system, "Reconfigure", "/reconfigure")
+        self._frame = frame = layout.Frame(system, "Reconfigure", "/reconfigure")
         self._graph = frame.use(system.graph)
         self._open: Reconfiguration | None = None
         self._shown: Description | None = None
@@ -42,9 +35,11 @@ class ReconfigurePage:
         self._busy = False
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-                self._select = add_select("Node", server, lambda change: self._choose(change.value))
+                self._select = layout.add_select(
+                    "Node", server, lambda change: self._choose(change.value)
+                )
                 self._select.classes("grow")
-            self._empty = empty_state(
+            self._empty = layout.empty_state(
                 "tune",
                 "No node has settings",
                 "Nodes with a server of dynamic_reconfigure appear here, such as:",
@@ -65,7 +60,7 @@ class ReconfigurePage:
 
     def _list(self) -> None:
         servers = find_servers(self._graph.survey().view)
-        options = offer_options(self._select, servers)
+        options = layout.offer_options(self._select, servers)
         if not self._select.value and options:
             self._select.set_value(options[0])
         self._empty.set_visibility(not options and self._graph.complete)
@@ -78,7 +73,7 @@ class ReconfigurePage:
         self._shown, self._seen = None, 0
         self._pending.clear()
         if name:
-            address_of(query_of("/reconfigure", server=name))
+            layout.address_of(layout.query_of("/reconfigure", server=name))
             try:
                 self._open = Reconfiguration(self._system.node, self._system.permission, name)
             except RoszError as error:

@@ -12,8 +12,8 @@ from nicegui.elements.scene.scene_object3d import Object3D
 
 from rosz.errors import RoszError
 from rosz.web.model import IMAGE_TYPES, Frames, System
+from rosz.web.pages import layout
 from rosz.web.pages.handling import Handling
-from rosz.web.pages.layout import Frame, add_select, address_of, offer_options, show_text
 from rosz.web.pages.pointing import Pointing
 from rosz.web.scene import (
     AXES,
@@ -102,7 +102,7 @@ class ScenePage:
     def __init__(self, system: System, frame: str, show: str, view: str) -> None:
         self._system = system
         setup = read_setup(frame, show, view)
-        page = Frame(system, "3D", "/3d")
+        page = layout.Frame(system, "3D", "/3d")
         self._graph = page.use(system.graph)
         self._frames: Frames = page.use(system.frames)
         self._shown: list[_ShownDisplay] = []
@@ -138,7 +138,7 @@ class ScenePage:
 
     def _add_controls(self, setup: SceneSetup) -> None:
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-            self._fixed = add_select(
+            self._fixed = layout.add_select(
                 "Fixed frame", setup.frame, self._choose_frame, with_input=True
             ).classes("w-44")
             self._view = (
@@ -202,7 +202,7 @@ class ScenePage:
     def _changed(self) -> None:
         looks = tuple(shown.look for shown in self._shown)
         fixed = str(self._fixed.value or "") if self._chosen else ""
-        address_of(format_setup(SceneSetup(fixed, looks, str(self._view.value))))
+        layout.address_of(format_setup(SceneSetup(fixed, looks, str(self._view.value))))
 
     def _choose_frame(self) -> None:
         self._chosen = True
@@ -230,7 +230,7 @@ class ScenePage:
         if not self._chosen and (best := self._frames.best()) and best != self._fixed.value:
             self._fixed.set_options(names, value=best)
             self._chosen = False
-        offer_options(self._fixed, names)
+        layout.offer_options(self._fixed, names)
 
     def _refresh(self) -> None:
         fixed = str(self._fixed.value or "")
@@ -359,7 +359,7 @@ class _ShownDisplay:
 
     def wait(self, fault: str) -> None:
         """Say why there is nothing to show yet."""
-        show_text(self._fault, fault)
+        layout.show_text(self._fault, fault)
 
     def refresh(self, fixed: str) -> None:
         """Send new drawings to the browser."""
@@ -375,8 +375,8 @@ class _ShownDisplay:
         if not isinstance(self._drawn, _Drawn):
             self._drawn.set_visibility(self.look.visible)
         kind, status = self.display.kind, self.display.status
-        show_text(self._status, f"{kind}: {status}" if status else kind)
-        show_text(self._fault, self.display.fault)
+        layout.show_text(self._status, f"{kind}: {status}" if status else kind)
+        layout.show_text(self._fault, self.display.fault)
 
     def remove(self) -> None:
         """Take it off the page."""

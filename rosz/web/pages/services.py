@@ -7,17 +7,8 @@ from nicegui import ui
 from rosz.introspect import find_server, list_services
 from rosz.node.ros2 import request_type
 from rosz.web.model import System, call_service
+from rosz.web.pages import layout
 from rosz.web.pages.form import MessageForm
-from rosz.web.pages.layout import (
-    Frame,
-    add_table,
-    address_of,
-    column,
-    empty_state,
-    offer_choice,
-    query_of,
-    show_rows,
-)
 
 _PERIOD = 1.0
 _HIDDEN = ("/get_loggers", "/set_logger_level")
@@ -28,12 +19,12 @@ class ServicesPage:
 
     def __init__(self, system: System, service: str = "") -> None:
         self._system = system
-        self._frame = frame = Frame(system, "Services", "/services")
+        self._frame = frame = layout.Frame(system, "Services", "/services")
         self._graph = frame.use(system.graph)
         self._types: dict[str, str] = {}
         self._wanted = service
         with frame.content:
-            self._empty = empty_state(
+            self._empty = layout.empty_state(
                 "build",
                 "No service",
                 "Nodes that offer services appear here, such as:",
@@ -56,12 +47,12 @@ class ServicesPage:
 
     def _add_table(self, search: ui.input) -> ui.table:
         columns = [
-            column("name", "Service"),
-            column("type", "Type", "rosz-soft rosz-wide"),
-            column("nodes", "Node", "rosz-wide"),
+            layout.column("name", "Service"),
+            layout.column("type", "Type", "rosz-soft rosz-wide"),
+            layout.column("nodes", "Node", "rosz-wide"),
         ]
-        table = add_table(columns).props("wrap-cells")
-        offer_choice(table, self._choose)
+        table = layout.add_table(columns).props("wrap-cells")
+        layout.offer_choice(table, self._choose)
         search.on_value_change(lambda change: setattr(table, "filter", change.value or ""))
         return table
 
@@ -87,13 +78,13 @@ class ServicesPage:
         rows = [
             {
                 "name": entry.name,
-                "address": query_of("/services", service=entry.name),
+                "address": layout.query_of("/services", service=entry.name),
                 "type": ", ".join(entry.types),
                 "nodes": ", ".join(entry.nodes),
             }
             for entry in entries
         ]
-        show_rows(self._table, rows)
+        layout.show_rows(self._table, rows)
         if self._wanted in self._types:
             wanted, self._wanted = self._wanted, ""
             ui.timer(0, lambda: self._choose(wanted), once=True)
@@ -104,7 +95,7 @@ class ServicesPage:
         self._type.set_text(self._types.get(name, ""))
         self._answer.set_text("")
         self._button.disable()
-        address_of(query_of("/services", service=name))
+        layout.address_of(layout.query_of("/services", service=name))
         self._form.clear()
         view = self._graph.survey().view
         node = self._system.node

@@ -10,19 +10,8 @@ from rosz.errors import RoszError
 from rosz.introspect import FieldPath, find_topic, list_topics
 from rosz.names import short_type
 from rosz.web.model import FieldCondition, Sending, System, TopicWatch, message_tree
+from rosz.web.pages import layout
 from rosz.web.pages.form import MessageForm
-from rosz.web.pages.layout import (
-    Frame,
-    add_select,
-    address_of,
-    bandwidth_text,
-    card,
-    offer_options,
-    query_of,
-    rate_text,
-    show_text,
-    size_text,
-)
 
 _PERIOD = 0.25
 _LIST_PERIOD = 1.0
@@ -44,7 +33,7 @@ class TopicsPage:
         self, system: System, topic: str = "", field: str = "", condition: str = ""
     ) -> None:
         self._system = system
-        self._frame = frame = Frame(system, "Topics", "/topics")
+        self._frame = frame = layout.Frame(system, "Topics", "/topics")
         self._graph = frame.use(system.graph)
         self._field = field
         self._condition = condition
@@ -52,7 +41,7 @@ class TopicsPage:
         self._fault = ""
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
-                self._select = add_select(
+                self._select = layout.add_select(
                     "Topic",
                     topic,
                     lambda change: self._choose(change.value),
@@ -92,7 +81,7 @@ class TopicsPage:
         tokens = (token for token in survey.view.tokens if token.node_name != own)
         rows = [entry.name for entry in list_topics(tokens)]
         chosen = self._select.value
-        offer_options(self._select, rows)
+        layout.offer_options(self._select, rows)
         if self._watch is None and chosen and chosen in rows:
             self._open(chosen)
 
@@ -114,8 +103,10 @@ class TopicsPage:
 
     def _show_address(self) -> None:
         topic = self._select.value
-        query = query_of("/topics", topic=topic, field=self._field, condition=self._condition)
-        address_of(query)
+        query = layout.query_of(
+            "/topics", topic=topic, field=self._field, condition=self._condition
+        )
+        layout.address_of(query)
 
     def _open(self, topic: str) -> None:
         try:
@@ -184,21 +175,25 @@ class _Echo:
     def show_nothing(self, topic: str | None, fault: str) -> None:
         """Say why nothing is shown."""
         text = fault or (f"Waiting for '{topic}'." if topic else "Choose a topic.")
-        show_text(self._note, text)
+        layout.show_text(self._note, text)
 
     def show_flow(self, watch: TopicWatch) -> None:
         """Show what flows."""
         flow, delay = watch.flow(), watch.delay()
         parts = [short_type(watch.type_name)]
         if flow is not None:
-            parts += [rate_text(flow.rate), bandwidth_text(flow.bandwidth), size_text(flow.size)]
+            parts += [
+                layout.rate_text(flow.rate),
+                layout.bandwidth_text(flow.bandwidth),
+                layout.size_text(flow.size),
+            ]
         if delay is not None:
             parts.append(f"{delay.mean * _MILLI:.1f} ms old")
         self._flow.set_text(" · ".join(parts))
         text = "" if watch.received else "No message has come yet."
         if watch.received and watch.message() is None:
             text = f"None of {watch.received} messages fulfils the condition."
-        show_text(self._note, text)
+        layout.show_text(self._note, text)
 
     def show(self, tree: dict[str, Any]) -> None:
         """Show a message; new parts of it are opened."""
@@ -222,12 +217,12 @@ def _ids(tree: dict[str, Any]) -> list[str]:
 class _Publish:
     """The form that publishes."""
 
-    def __init__(self, system: System, frame: Frame) -> None:
+    def __init__(self, system: System, frame: layout.Frame) -> None:
         self._system = system
         self._frame = frame
         self._sending: Sending | None = None
         frame.keep(self)
-        with card("Publish"):
+        with layout.card("Publish"):
             with ui.row().classes("w-full gap-3"):
                 self._topic = ui.input("Topic").props("dense").classes("grow")
                 self._type = (

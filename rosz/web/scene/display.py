@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -255,6 +256,21 @@ class ReceivingDisplay(Display):
         self._cls: Any = find_class(node, token)
         self._frames = frames
 
+    def _find(
+        self, fixed: str, header: Any, faults: Counter[str], *, latest: bool = False
+    ) -> Pose | None:
+        """Return the pose of the frame of a header; None, with the reason counted, if unknown."""
+        stamp = 0 if latest else header.stamp.to_nsec()
+        pose, why = self._frames.locate(fixed, header.frame_id, stamp)
+        if pose is None:
+            faults[why] += 1
+        return pose
+
+    def _report(self, faults: Counter[str], *reasons: str) -> None:
+        """Show why parts are not drawn: two of the faults of frames, and other reasons."""
+        texts = [f"{count} not drawn: {why}" for why, count in faults.items()]
+        self.fault = "; ".join(filter(None, [*texts[:2], *reasons]))
+
 
 class _Kept(NamedTuple):
     """A message that has come, as bytes."""
@@ -314,19 +330,20 @@ class TopicDisplay(ReceivingDisplay):
         self._switch()
         with self._lock:
             kept = list(self._kept)
+        fault = ""
         for sample in reversed(kept):
             if not self._stamped:
                 return self._choose(fixed, sample, IDENTITY)
-            try:
-                pose = self._frames.find(fixed, sample.frame, sample.stamp)
-            except TransformError:
+            pose, why = self._frames.locate(fixed, sample.frame, sample.stamp)
+            if pose is None:
+                fault = fault or why
                 continue
             with self._lock:
                 while self._kept and self._kept.oldest is not sample:
                     self._kept.pop()
             return self._choose(fixed, sample, pose)
         if kept:
-            self.fault = self._frames.why_not(fixed, kept[-1].frame, kept[-1].stamp)
+            self.fault = fault
         return self._wanted != self._shown
 
     def _choose(self, fixed: str, sample: _Kept, pose: Pose) -> bool:

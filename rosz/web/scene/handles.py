@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from rosz.errors import RoszError, TransformError
+from rosz.errors import RoszError
 from rosz.introspect import Survey
 from rosz.lifecycle import Closable
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Point, Quaternion, Vector3
 from rosz.msgs.geometry_msgs.msg import Pose as PoseMessage
 from rosz.msgs.std_msgs.msg import ColorRGBA, Header
-from rosz.msgs.visualization_msgs.msg import (
-    InteractiveMarkerControl,
-    InteractiveMarkerFeedback,
-    InteractiveMarkerInit,
-    InteractiveMarkerUpdate,
-    Marker,
-    MenuEntry,
-)
+from rosz.msgs.visualization_msgs import msg
 from rosz.node import Node
 from rosz.transforms import Pose, compose, invert
 from rosz.web.model import Frames
@@ -37,8 +31,8 @@ HANDLE_TYPE = "visualization_msgs/InteractiveMarkerUpdate"
 _UPDATE, _FULL, FEEDBACK = "update", "update_full", "feedback"
 """The last parts of the names of the topics of a server."""
 _QUEUE = 100
-_Control = InteractiveMarkerControl
-_Feedback = InteractiveMarkerFeedback
+_Control = msg.InteractiveMarkerControl
+_Feedback = msg.InteractiveMarkerFeedback
 _EVENTS = {
     "down": _Feedback.MOUSE_DOWN,
     "move": _Feedback.POSE_UPDATE,
@@ -122,7 +116,7 @@ class HandleDisplay(ReceivingDisplay):
             self._version += 1
 
     def _update(self, message: Any) -> None:
-        if message.type != InteractiveMarkerUpdate.UPDATE:
+        if message.type != msg.InteractiveMarkerUpdate.UPDATE:
             return
         with self._lock:
             self._sequence = message.server_id, message.seq_num
@@ -144,29 +138,22 @@ class HandleDisplay(ReceivingDisplay):
     def refresh(self, fixed: str) -> bool:
         """Find where the markers are; return whether there is something new to draw."""
         self._switch()
-        faults: dict[str, int] = {}
+        faults: Counter[str] = Counter()
         with self._lock:
             for handle in self._handles.values():
-                frame = handle.marker.header.frame_id.removeprefix("/")
-                stamp = handle.marker.header.stamp.to_nsec()
-                try:
-                    place = self._frames.find(fixed, frame, stamp)
-                except TransformError:
-                    why = self._frames.why_not(fixed, frame, stamp)
-                    faults[why] = faults.get(why, 0) + 1
-                    place = None
+                place = self._find(fixed, handle.marker.header, faults)
                 self._version += place != handle.frame
                 handle.frame = place
-            texts = [f"{count} not drawn: {why}" for why, count in faults.items()]
-            reports = (self._objection, self._refused)
-            self.fault = "; ".join([*texts[:2], *(report for report in reports if report)])
+            self._report(faults, self._objection, self._refused)
             return self._shown != (self._version, self.look)
 
     def _subscribe(self) -> Sequence[Closable]:
         subscribe, space = self._node.subscription, self._space
         return (
-            subscribe(space + _UPDATE, InteractiveMarkerUpdate, self._update, queue_size=_QUEUE),
-            subscribe(space + _FULL, InteractiveMarkerInit, self._init, queue_size=_QUEUE),
+            subscribe(
+                space + _UPDATE, msg.InteractiveMarkerUpdate, self._update, queue_size=_QUEUE
+            ),
+            subscribe(space + _FULL, msg.InteractiveMarkerInit, self._init, queue_size=_QUEUE),
         )
 
     def _forget(self) -> None:
@@ -232,7 +219,7 @@ class HandleDisplay(ReceivingDisplay):
 
     # The user's actions in the browser.
 
-    def menu(self, name: str) -> list[MenuEntry]:
+    def menu(self, name: str) -> list[msg.MenuEntry]:
         """Return the entries of the menu of a marker, all levels in one list."""
         with self._lock:
             handle = self._handles.get(name)
@@ -302,24 +289,24 @@ def default_markers(control: Any, scale: float) -> Iterable[Any]:
     mode = control.interaction_mode
     if mode == _Control.MOVE_AXIS:
         for side in (scale, -scale):
-            yield Marker(
-                type=Marker.ARROW,
+            yield msg.Marker(
+                type=msg.Marker.ARROW,
                 pose=pose,
                 color=color,
                 scale=Vector3(0.15 * scale, 0.25 * scale, 0.2 * scale),
                 points=[Point(0.5 * side, 0, 0), Point(0.9 * side, 0, 0)],
             )
     elif mode in {_Control.MOVE_PLANE, _Control.ROTATE_AXIS, _Control.MOVE_ROTATE}:
-        yield Marker(
-            type=Marker.TRIANGLE_LIST,
+        yield msg.Marker(
+            type=msg.Marker.TRIANGLE_LIST,
             pose=pose,
             color=color,
             scale=Vector3(scale, scale, scale),
             points=_ring(),
         )
     elif mode == _Control.MENU:
-        yield Marker(
-            type=Marker.TEXT_VIEW_FACING,
+        yield msg.Marker(
+            type=msg.Marker.TEXT_VIEW_FACING,
             text=control.description or "menu",
             pose=PoseMessage(Point(0, 0, 1.2 * scale), Quaternion(0, 0, 0, 1)),
             color=ColorRGBA(0.5, 0.5, 0.5, 1.0),

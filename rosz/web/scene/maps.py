@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rosz.errors import TransformError, UsageError
+from rosz.errors import UsageError
 from rosz.introspect import Survey
 from rosz.lifecycle import Closable
 from rosz.msgs.map_msgs.msg import OccupancyGridUpdate
@@ -74,13 +74,12 @@ class MapDisplay(ReceivingDisplay):
         with self._lock:
             grid, fault = self._map, self._refused
         if grid is not None:
-            frame = grid.header.frame_id.removeprefix("/")
-            try:
-                self._place = fixed, self._frames.find(fixed, frame)
-            except TransformError:
-                fault = self._frames.why_not(fixed, frame)
-                if self._place is not None and self._place[0] != fixed:
-                    self._place = None
+            pose, why = self._frames.locate(fixed, grid.header.frame_id)
+            if pose is not None:
+                self._place = fixed, pose
+            elif self._place is not None and self._place[0] != fixed:
+                self._place = None
+            fault = why or fault
         self.fault = fault
         return self._shown != (self.look, self._version, self._place)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rosz.errors import RoszError, TransformError
+from rosz.errors import RoszError
 from rosz.introspect import Survey
 from rosz.lifecycle import Closable
 from rosz.msgs.visualization_msgs.msg import Marker
@@ -84,7 +85,7 @@ class MarkerDisplay(ReceivingDisplay):
         """Find where the markers are; return whether there is something new to draw."""
         self._switch()
         now = self._node.now()
-        faults: dict[str, int] = {}
+        faults: Counter[str] = Counter()
         with self._lock:
             over = [key for key, entry in self._placed.items() if entry.ends <= now]
             for key in over:
@@ -93,23 +94,16 @@ class MarkerDisplay(ReceivingDisplay):
             for entry in self._placed.values():
                 changed = self._place(entry, fixed, faults) or changed
             self._version += changed
-            texts = [f"{count} not drawn: {why}" for why, count in faults.items()]
-            self.fault = "; ".join([*texts[:2], *([self._refused] if self._refused else [])])
+            self._report(faults, self._refused)
             return self._shown != (self._version, self.look)
 
-    def _place(self, entry: _Placed, fixed: str, faults: dict[str, int]) -> bool:
+    def _place(self, entry: _Placed, fixed: str, faults: Counter[str]) -> bool:
         """Return whether a marker came to another place."""
         locked = entry.marker.frame_locked
         if entry.fixed == fixed and entry.pose is not None and not locked:
             return False
-        header = entry.marker.header
-        frame = header.frame_id.removeprefix("/")
-        stamp = 0 if locked else header.stamp.to_nsec()
-        try:
-            pose = self._frames.find(fixed, frame, stamp)
-        except TransformError:
-            why = self._frames.why_not(fixed, frame, stamp)
-            faults[why] = faults.get(why, 0) + 1
+        pose = self._find(fixed, entry.marker.header, faults, latest=locked)
+        if pose is None:
             previous, entry.pose = entry.pose, entry.pose if entry.fixed == fixed else None
             return previous is not entry.pose
         previous, entry.pose, entry.fixed = entry.pose, pose, fixed

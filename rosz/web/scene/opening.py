@@ -6,14 +6,8 @@ from rosz.errors import NotFoundError, UsageError
 from rosz.introspect import Survey, list_topics, topic_types
 from rosz.names import short_type
 from rosz.web.model import IMAGE_TYPES, Frames, System
+from rosz.web.scene import display
 from rosz.web.scene.depth import DepthDisplay, info_of
-from rosz.web.scene.display import (
-    DRAWN_TYPES,
-    Display,
-    FrameDisplay,
-    ImageDisplay,
-    TopicDisplay,
-)
 from rosz.web.scene.handles import FEEDBACK, HANDLE_TYPE, HandleDisplay
 from rosz.web.scene.maps import MAP_TYPE, UPDATES, MapDisplay
 from rosz.web.scene.markers import MARKER_TYPES, MarkerDisplay
@@ -22,7 +16,7 @@ from rosz.web.scene.robot import RobotDisplay
 from rosz.web.scene.setup import AXES, DEPTH, DESCRIPTION, GRID, ROBOT, TF, Look
 from rosz.web.scene.still import STILL, StillDisplay
 
-_TYPES = DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES | {HANDLE_TYPE, MAP_TYPE}
+_TYPES = display.DRAWN_TYPES | MARKER_TYPES | IMAGE_TYPES | {HANDLE_TYPE, MAP_TYPE}
 
 
 def list_displays(survey: Survey) -> dict[str, str]:
@@ -44,7 +38,7 @@ def list_displays(survey: Survey) -> dict[str, str]:
 
 def open_display(
     system: System, survey: Survey, frames: Frames, meshes: Meshes, look: Look
-) -> Display:
+) -> display.Display:
     """Open a display.
 
     Args:
@@ -61,7 +55,7 @@ def open_display(
     if name in STILL:
         return StillDisplay(look, frames)
     if name == TF:
-        return FrameDisplay(look, frames)
+        return display.FrameDisplay(look, frames)
     if name.partition(":")[0] == ROBOT:
         system.permission.check("get", name.partition(":")[2] or DESCRIPTION)
         return RobotDisplay(node, look, frames, meshes)
@@ -75,7 +69,7 @@ def open_display(
 
 def _open_topic(
     system: System, survey: Survey, frames: Frames, meshes: Meshes, look: Look
-) -> Display:
+) -> display.Display:
     name, node = look.name, system.node
     system.permission.check("subscribe", name)
     types = [short_type(type_name) for type_name in topic_types(survey.view).get(name, ())]
@@ -91,7 +85,7 @@ def _open_topic(
         unseen = system.permission.objection("subscribe", name + UPDATES)
         return MapDisplay(node, survey, look, frames, unseen)
     if types[0] in IMAGE_TYPES:
-        return ImageDisplay(node, survey, look)
-    if types[0] not in DRAWN_TYPES:
+        return display.ImageDisplay(node, survey, look)
+    if types[0] not in display.DRAWN_TYPES:
         raise UsageError(f"topic '{name}' is of type {types[0]}, which is not drawn")
-    return TopicDisplay(node, survey, look, frames)
+    return display.TopicDisplay(node, survey, look, frames)

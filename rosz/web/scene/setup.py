@@ -1,8 +1,8 @@
 """The settings of the view, as the address of the page holds them.
 
 ``/3d?frame=map&show=grid,tf,/scan;color=%23ff0000;size=4,/map;hidden`` names the fixed frame and
-the displays, with commas between; a display is the name of a topic, or ``grid``, ``axes``, ``tf``
-or ``robot``, and what differs from its defaults.
+the displays, separated by commas. A display is its name (of a topic, or ``grid``, ``axes``, ``tf``
+or ``robot``), and after semicolons the settings that differ from the defaults.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 
 AXES, DEPTH, GRID, TF, ROBOT = "axes", "depth", "grid", "tf", "robot"
 DESCRIPTION = "/robot_description"
-"""The parameter of the robot that has no other name."""
+"""The parameter with the description of the robot, where no other is named."""
 _BETWEEN, _WITHIN = ",", ";"
 _MOST_SIZE = 1000.0
 _MOST_KEPT = 100_000
@@ -72,7 +72,7 @@ DEFAULT = (Look(GRID), Look(TF))
 def read_setup(frame: str, show: str, view: str) -> SceneSetup:
     """Return the setup of an address; invalid parts have their defaults.
 
-    There may be more displays than a page shows: `MOST_DISPLAYS`.
+    It may have more displays than a page shows; see `MOST_DISPLAYS`.
     """
     looks = tuple(_read_look(look) for look in show.split(_BETWEEN) if look.strip())
     return SceneSetup(frame, looks or DEFAULT, view if view == "top" else "orbit")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rosz.errors import TransformError
 from rosz.transforms import IDENTITY, Pose
 from rosz.web.model import Frames
 from rosz.web.scene.display import Display
@@ -34,11 +33,7 @@ class StillDisplay(Display):
     def refresh(self, fixed: str) -> bool:
         """Return whether the settings changed, or its frame moved."""
         frame = self.look.frame
-        self.fault = ""
-        try:
-            self._place = self._frames.find(fixed, frame) if frame else IDENTITY
-        except TransformError:
-            self._place, self.fault = None, self._frames.why_not(fixed, frame)
+        self._place, self.fault = self._frames.locate(fixed, frame) if frame else (IDENTITY, "")
         return self._shown != (self.look, self._place)
 
     def _draw_all(self, drawing: Drawing) -> None:

@@ -9,15 +9,7 @@ import msgspec
 
 from rosz.access import PagePolicy
 from rosz.msgs.builtin_interfaces.msg import Time
-from rosz.msgs.geometry_msgs.msg import (
-    Point,
-    PointStamped,
-    Pose,
-    PoseStamped,
-    PoseWithCovariance,
-    PoseWithCovarianceStamped,
-    Quaternion,
-)
+from rosz.msgs.geometry_msgs import msg as geometry
 from rosz.msgs.std_msgs.msg import Header
 from rosz.node import Node, Publisher
 from rosz.transforms import from_rpy
@@ -34,9 +26,9 @@ class Tool(msgspec.Struct, frozen=True):
 
 _PULL = "Press where it is, and pull to where it looks."
 TOOLS = {
-    "estimate": Tool("Pose estimate", "/initialpose", PoseWithCovarianceStamped, _PULL),
-    "goal": Tool("Goal", "/move_base_simple/goal", PoseStamped, _PULL),
-    "point": Tool("Point", "/clicked_point", PointStamped, "Click a point."),
+    "estimate": Tool("Pose estimate", "/initialpose", geometry.PoseWithCovarianceStamped, _PULL),
+    "goal": Tool("Goal", "/move_base_simple/goal", geometry.PoseStamped, _PULL),
+    "point": Tool("Point", "/clicked_point", geometry.PointStamped, "Click a point."),
 }
 _POSITION_VARIANCE = 0.5 * 0.5
 _YAW_VARIANCE = (math.pi / 12) ** 2
@@ -88,13 +80,15 @@ class Tools:
         """
         self.take(name)
         header = Header(stamp=Time.from_nsec(self._node.now()), frame_id=frame)
-        place = Point(*point)
-        message: Any = PointStamped(header, place)
-        pose = Pose(place, Quaternion(*from_rpy(0.0, 0.0, yaw)))
+        place = geometry.Point(*point)
+        message: Any = geometry.PointStamped(header, place)
+        pose = geometry.Pose(place, geometry.Quaternion(*from_rpy(0.0, 0.0, yaw)))
         if name == "estimate":
-            message = PoseWithCovarianceStamped(header, PoseWithCovariance(pose, _covariance()))
+            message = geometry.PoseWithCovarianceStamped(
+                header, geometry.PoseWithCovariance(pose, _covariance())
+            )
         elif name == "goal":
-            message = PoseStamped(header, pose)
+            message = geometry.PoseStamped(header, pose)
         self._publishers[name].publish(message)
 
     def close(self) -> None:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import time
 from threading import Timer
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
-from rosz.bridges.fleet.relays import Edit, Ids, TopicRelay
+from rosz.bridges.fleet import FleetPlan
+from rosz.bridges.fleet.crossing import _Direction
+from rosz.bridges.fleet.relays import _DEEPEST, Edit, Ids, TopicRelay
+from rosz.graph import View
 from rosz.qos import QoS
-from rosz.wire import pack_attachment
+from rosz.wire import Kind, Token, pack_attachment, read_attachment
 
 HERE, THERE = bytes(16), bytes(range(16))
 
@@ -40,6 +43,15 @@ def test_only_the_first_sample_of_a_publisher_without_token_waits() -> None:
     for _ in range(1000):
         assert ids.find(HERE) is None
     assert time.monotonic() - began < 100  # 2000 s if each waited
+
+
+def test_a_session_is_found_however_many_came_and_went_since() -> None:
+    tokens = [Token(0, f"{number:032x}", 0, 0, Kind.NODE, "/", "a") for number in range(10_001)]
+    side: Any = SimpleNamespace(graph=SimpleNamespace(known=lambda: View(tokens[:1])))
+    direction = _Direction(side, side, FleetPlan(prefix="/robot1"), outward=True)
+    first, *_ = (direction.mirrored(token) for token in tokens)
+    assert first is not None
+    assert direction.source_ids(f"key/{first.zid}/*") == f"key/{tokens[0].zid}/*"
 
 
 class Wire:
@@ -83,4 +95,24 @@ def test_a_limit_lets_samples_without_attachment_pass(
         relay._pass(numbered)
         now += 0.25
     assert wire.sent[4:] == [pack_attachment(number, 0, HERE) for number in (7, 8)]
+    relay.close()
+
+
+def test_a_limit_remembers_publishers_that_send(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many others came and went: its numbers stay without gaps."""
+    now = 100.0
+    clock = SimpleNamespace(monotonic=lambda: now)
+    monkeypatch.setattr("rosz.bridges.fleet.relays.time", clock)
+    wire: Any = Wire()
+    ids: Any = SimpleNamespace(find=lambda _gid: None)  # waits for no token
+    relay = TopicRelay(wire, "a", wire, "b", qos=QoS(), rate=1, edit=Edit(ids))
+    for number in range(1, 3 * _DEEPEST):
+        attachments = [pack_attachment(number, 0, HERE)]
+        attachments.append(pack_attachment(1, 0, number.to_bytes(16, "big")[::-1]))
+        for attachment in attachments:
+            relay._pass(cast("Any", SimpleNamespace(attachment=attachment)))
+        now += 0.75
+    own = [read_attachment(sent)[0] for sent in wire.sent if read_attachment(sent)[2] == HERE]
+    assert own == list(range(1, 1 + len(own)))
+    assert len(own) > _DEEPEST
     relay.close()

@@ -180,6 +180,7 @@ def test_a_viewer(script: Path, network: Network) -> None:
     with bridge_on(network, package_in(network.folder)) as bridge:
         simulate(bridge.node)
         eventually(lambda: bridge.node.params.has("/gains/p"), "the parameter")
+        bridge.wait_for_subscription("/up")
         variables = network.variables()
         program = Program([node_js, str(script), str(bridge.server.port)], variables, script.parent)
         try:

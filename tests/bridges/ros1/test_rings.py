@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, cast
+from xmlrpc.client import ServerProxy
 
 import pytest
 from network import TIMEOUT, Network, eventually
@@ -88,3 +89,24 @@ def test_a_bridge_refuses_the_master_of_its_own_network(
         with AttachedBridge(uri, network.environment()):
             eventually(lambda: "it belongs to this network already" in caplog.text)
             assert not master.nodes()
+
+
+def test_a_change_that_a_master_tells_late_is_not_taken_back() -> None:
+    with ExitStack() as stack:
+        place, other = (Place(name, stack) for name in ("here", "there"))
+        stack.enter_context(place.join(other))
+        eventually(partial(_reaches, place, other))
+        master = stack.enter_context(ServerProxy(f"http://127.0.0.1:{other.master.port}"))
+        (_, _, (publishers, _, _)) = cast("Any", master.getSystemState("/test"))
+        (name,) = {
+            node for _, nodes in publishers for node in nodes if node.startswith("/ros1_bridge_")
+        }
+        (_, _, uri) = cast("Any", master.lookupNode("/test", name))
+        place.node.params["/late"] = 1
+        eventually(lambda: other.node.params.get("/late", None) == 1)
+        place.node.params["/late"] = 2
+        eventually(lambda: other.node.params.get("/late", None) == 2)
+        stack.enter_context(ServerProxy(uri)).paramUpdate("/master", "/late/", 1)
+        other.node.params["/marker"] = True
+        eventually(lambda: place.node.params.get("/marker", False))
+        assert place.node.params["/late"] == other.node.params["/late"] == 2

@@ -5,8 +5,10 @@ from __future__ import annotations
 import gc
 import json
 import socket
+import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
@@ -62,6 +64,33 @@ def test_all_come_at_once(network: Network) -> None:
         eventually(lambda: bridge.server.clients == 1, "the end of the others")
         with bridge.client() as late:
             late.sync()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="it counts threads of the system")
+def test_threads_of_many_subscriptions(network: Network) -> None:
+    def threads() -> int:
+        return sum(1 for _ in Path("/proc/self/task").iterdir())
+
+    count, talker = 500, network.node("talker")
+    limits = RosbridgeLimits(subscriptions=count + 1)
+    with bridge_on(network, limits=limits) as bridge, bridge.client(ping_interval=None) as client:
+        client.send("subscribe", topic="/other", type="std_msgs/String")
+        client.sync()
+        few = threads()
+        for number in range(count):
+            client.send("subscribe", topic=f"/topic{number}", type="std_msgs/String")
+            if number % 20 == 0:
+                client.sync()
+        client.sync()
+        eventually(lambda: threads() <= few + 30, "few threads without traffic")
+        publishers = [talker.publisher(f"topic{number}", String) for number in range(count)]
+        for publisher in publishers:
+            publisher.wait_for_subscribers()
+        for publisher in publishers:
+            publisher.publish("hello")
+        topics = {client.receive_op("publish")["topic"] for _ in range(count)}
+        assert topics == {f"/topic{number}" for number in range(count)}
+        eventually(lambda: threads() <= few + 30, "few threads after the traffic")
 
 
 @system

@@ -20,7 +20,7 @@ from PIL import Image as Picture
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from rosz.access import AccessPolicy, ServerAccess
+from rosz.access import AccessPolicy, PasswordGuesses, ServerAccess
 from rosz.actions import ActionClient, GoalState
 from rosz.bridges.rosbridge import RosbridgeLimits
 from rosz.errors import ActionError
@@ -464,8 +464,9 @@ def test_passwords(network: Network, options: Any, path: str, status: int | None
         assert refused.value.response.status_code == status
 
 
-def test_guessing_becomes_slow(network: Network) -> None:
+def test_guessing_becomes_slow(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each wrong password of an address makes the next pause longer, however it is sent."""
+    monkeypatch.setattr(PasswordGuesses.__init__, "__defaults__", (lambda: 100.0,))  # no pause ends
     with bridge_on(network, access=ServerAccess(policy=AccessPolicy(password="secret"))) as bridge:
         for status in (401, 401, 401, 401):
             with pytest.raises(InvalidStatus, match=str(status)), bridge.client("?token=wrong"):
@@ -509,10 +510,12 @@ def test_pages_of_this_machine(bridge: Bridge) -> None:
 
 def test_rosauth(network: Network) -> None:
     with bridge_on(network, access=ServerAccess(policy=AccessPolicy(password="secret"))) as bridge:
-        now = int(time.time())
-        fields = {"client": "c", "dest": "d", "rand": "r", "t": now, "level": "l", "end": now + 600}
-        mac = hashlib.sha512("".join(map(str, ("secret", *fields.values()))).encode()).hexdigest()
         with bridge.client() as client:
+            now = int(time.time())  # the message is valid for five seconds
+            fields: dict[str, Any] = {"client": "c", "dest": "d", "rand": "r"}
+            fields |= {"t": now, "level": "l", "end": now + 600}
+            text = "".join(map(str, ("secret", *fields.values())))
+            mac = hashlib.sha512(text.encode()).hexdigest()
             client.send("auth", mac=mac, **fields)
             client.sync()
         for late in ({"mac": "0" * 128, **fields}, {"mac": mac, **fields, "t": now - 60}):

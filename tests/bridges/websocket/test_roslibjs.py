@@ -197,7 +197,12 @@ def test_a_page(script: Path, network: Network) -> None:
     heard: SimpleQueue[String] = SimpleQueue()
     node.subscription("up", String, heard.put)
     port = free_port()
-    server = WebsocketBridge(network.node("bridge"), port=port)
+    bridge = network.node("bridge")
+    server = WebsocketBridge(bridge, port=port)
+    # It publishes to no subscription, and calls no service, that it does not know.
+    bridge.context.graph.wait_for_subscribers("/up", 1, TIMEOUT)
+    for service in ("/flip", "/fib/_action/send_goal"):
+        bridge.context.graph.wait_for_service(service, TIMEOUT)
     node_js = shutil.which("node")
     assert node_js is not None
     program = Program([node_js, str(script), str(port)], network.variables(), script.parent)

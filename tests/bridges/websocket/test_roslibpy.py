@@ -89,6 +89,8 @@ def test_a_program(bridge: Bridge, transport: str) -> None:
         return True, "flipped"
 
     node.service("flip", SetBool, flip)
+    bridge.wait_for_subscription("/pose")
+    bridge.wait_for_service("/flip")
     program = bridge.network.program(PROGRAM, str(bridge.server.port), transport)
     program.wait_for("ready")
     pose = poses.get(timeout=TIMEOUT)
@@ -138,6 +140,7 @@ def test_goals(bridge: Bridge) -> None:
         goal.succeed(Fibonacci.Result([0, 1, 1]))
 
     node.action_server("fib", Fibonacci, execute)
+    bridge.wait_for_service("/fib/_action/send_goal")
     program = bridge.network.program(ACTION, str(bridge.server.port))
     program.wait_for("feedback [0, 1]")
     heard.set()

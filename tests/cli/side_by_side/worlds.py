@@ -24,7 +24,7 @@ __all__ = ("Outcome", "Ros1", "Rosz", "World")
 
 _ROOT = Path(__file__).parents[3]
 _NODES = Path(__file__).with_name("nodes.py")
-_TIMEOUT = 40.0
+_TIMEOUT = 200.0
 _MODULES = ("rosmaster", "rostopic", "rosservice", "rosnode", "rosmsg", "rosparam", "std_srvs.srv")
 _SOME = 3
 """Lines after which what goes on for ever has said enough."""

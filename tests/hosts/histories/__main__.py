@@ -25,8 +25,9 @@ def seeds(words: list[str]) -> Iterator[int]:
 def main() -> None:
     """Play histories, and print what became of them."""
     late = lost = written = count = 0
-    for seed in seeds(sys.argv[1:]):
-        history = History.of(seed)
+    ends = "--ends" in sys.argv
+    for seed in seeds([word for word in sys.argv[1:] if word != "--ends"]):
+        history = History.of(seed, "abcd", ends=True) if ends else History.of(seed)
         result = play(history)
         count += 1
         written += result.written

@@ -5,19 +5,27 @@ from __future__ import annotations
 import random
 from typing import Literal, NamedTuple
 
-__all__ = ("DURATION", "HOSTS", "Action", "History")
+__all__ = ("DURATION", "HOSTS", "Action", "History", "chain", "mesh")
 
-HOSTS = ("a", "b", "c")
-MESH = {"a": "bc", "b": "ac", "c": "ab"}
-CHAIN = {"a": "b", "b": "ac", "c": "b"}
-"""The hosts that each one dials."""
+HOSTS = "abc"
 DURATION = 24.0
 """Seconds after which every link is healed and every process goes on."""
 _SETTLED = 2.0
 _STOPPED_SHARE = 0.6
 """Of the processes that something happens to; the others are killed."""
 
-Verb = Literal["cut", "heal", "stop", "resume", "kill", "start"]
+Verb = Literal["cut", "heal", "stop", "resume", "kill", "end", "start"]
+
+
+def mesh(hosts: str) -> dict[str, str]:
+    """Return the hosts that each one dials if all dial all."""
+    return {host: hosts.replace(host, "") for host in hosts}
+
+
+def chain(hosts: str) -> dict[str, str]:
+    """Return the hosts that each one dials if those beside each other do."""
+    beside = zip("-" + hosts, hosts, hosts[1:] + "-", strict=False)
+    return {host: (before + after).strip("-") for before, host, after in beside}
 
 
 class Action(NamedTuple):
@@ -48,16 +56,29 @@ class History(NamedTuple):
     actions: list[Action]
 
     @classmethod
-    def of(cls, seed: int) -> History:
-        """Return the history that a seed decides."""
+    def of(cls, seed: int, hosts: str = HOSTS, *, ends: bool = False) -> History:
+        """Return the history that a seed decides.
+
+        Args:
+            seed: The seed.
+            hosts: Names of the hosts.
+            ends: Whether nodes, one of them at least, are told to end, rather than stopped or
+                killed.
+        """
         draw = random.Random(seed)  # not for security
-        neighbours = draw.choice([MESH, CHAIN, {"a": "", "b": "a", "c": "ab"}])
-        places = [(host, what) for host in HOSTS for what in ("link", "core", "node")]
+        later_dial_earlier = {host: hosts[:index] for index, host in enumerate(hosts)}
+        neighbours = draw.choice([mesh(hosts), chain(hosts), later_dial_earlier])
+        places = [(host, what) for host in hosts for what in ("link", "core", "node")]
+        chosen = draw.sample(places, draw.randint(2, 4))
+        if ends and not any(what == "node" for _, what in chosen):
+            chosen[0] = draw.choice(hosts), "node"
         found: list[Action] = []
         verbs: tuple[Verb, Verb]
-        for host, what in draw.sample(places, draw.randint(2, 4)):
+        for host, what in chosen:
             begin = draw.uniform(_SETTLED, DURATION / 2)
-            if what == "link":
+            if ends and what == "node":
+                verbs, seconds = ("end", "start"), draw.uniform(0, 3)
+            elif what == "link":
                 verbs, seconds = ("cut", "heal"), draw.uniform(1, DURATION)
             elif draw.random() < _STOPPED_SHARE:
                 verbs, seconds = ("stop", "resume"), draw.uniform(6, 14)

@@ -127,6 +127,12 @@ class _Machine:
             self.program(action.what).send(signal.SIGSTOP)
         elif action.verb == "resume":
             self.program(action.what).send(signal.SIGCONT)
+        elif action.verb == "end":
+            self.node.send(signal.SIGTERM)
+            assert self.node.process.stdin is not None
+            self.node.process.stdin.close()  # which the program waits for
+            self.node.exit_code()
+            self.collect(live="is lost with this process" not in self.node.output)
         elif action.verb == "kill":
             self.program(action.what).kill()
             if action.what == "node":
@@ -138,7 +144,8 @@ class _Machine:
         """Note what the node has written, and who has it.
 
         A write may be lost together with its writer if some replica did not acknowledge it, or if
-        there was no other.
+        there was no other; a writer that is told to end hands such writes over, or says what is
+        lost.
         """
         for line in self.node.lines:
             word, *rest = line.split()
@@ -156,7 +163,7 @@ class _Machine:
 
 
 def play(history: History) -> Result:
-    """Play a history on three hosts."""
+    """Play a history."""
     with World() as world:
         hosts = world.hosts(*history.neighbours)
         machines = {host.name: _Machine(host, history.neighbours[host.name]) for host in hosts}

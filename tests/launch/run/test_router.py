@@ -103,8 +103,8 @@ def test_a_router_that_does_not_start_is_explained(
 ) -> None:
     from rosz.errors import LaunchError
 
-    environment = network.environment(rendezvous="unixsock-stream//no/such/folder/z.sock")
-    variables = network.variables(ROSZ_RENDEZVOUS="unixsock-stream//no/such/folder/z.sock")
+    environment = network.environment(rendezvous="unixsock-stream//proc/nowhere/z.sock")
+    variables = network.variables(ROSZ_RENDEZVOUS="unixsock-stream//proc/nowhere/z.sock")
     with pytest.raises(
         LaunchError, match="ended with exit code 1; ROSZ_MODE=peer starts them without"
     ):

@@ -116,9 +116,9 @@ def test_setup_steps_come_first(tmp_path: Path) -> None:
 
 
 def test_a_dump_that_cannot_be_written_stops_the_launch(tmp_path: Path) -> None:
-    plan = Plan(setup=(setup("dump", "/a", "/no/such/folder/x"),))
+    plan = Plan(setup=(setup("dump", "/a", "/proc/nowhere/x"),))
     with (
-        pytest.raises(LaunchError, match=r"test\.launch:3:5: cannot dump to '/no/such/folder/x'"),
+        pytest.raises(LaunchError, match=r"test\.launch:3:5: cannot dump to '/proc/nowhere/x'"),
         launch(tmp_path, plan=plan, network=MemoryNetwork(a=1)) as run,
     ):
         run.join()

@@ -9,8 +9,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from params.simulation.exploration import SCRIPTS, explore  # found by the line above
+from params.simulation.exploration import Result, explore  # found by the line above
 from params.simulation.histories import play_seed
+from params.simulation.scripts import SCRIPTS
 from params.simulation.violation import Violation
 
 
@@ -35,6 +36,12 @@ def play(steps: int, seed: int, length: int, rounds: int) -> int:
     return findings
 
 
+def tell(result: Result, waiting: int) -> None:
+    """Print how far an exploration is."""
+    if not result.states % 100_000:
+        print(f"{result.states} states, {waiting} wait", file=sys.stderr, flush=True)
+
+
 def main() -> int:
     """Read the arguments and do what they say."""
     parser = argparse.ArgumentParser(prog="python -m tests.params.simulation")
@@ -42,13 +49,18 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="first seed")
     parser.add_argument("--length", type=int, default=60, help="actions before a quiet time")
     parser.add_argument("--rounds", type=int, default=1, help="quiet times in a history")
-    parser.add_argument("--explore", choices=sorted(SCRIPTS), help="explore a small world instead")
+    parser.add_argument(
+        "--explore", nargs="+", choices=sorted(SCRIPTS), help="explore small worlds instead"
+    )
     parser.add_argument("--states", type=int, default=1_000_000, help="states to explore at most")
     arguments = parser.parse_args()
     if arguments.explore:
-        result = explore(SCRIPTS[arguments.explore], arguments.states)
-        print(result)
-        return int(bool(result.finding))
+        findings = 0
+        for name in arguments.explore:
+            result = explore(SCRIPTS[name], arguments.states, tell)
+            print(f"{name}: {result}", flush=True)
+            findings += bool(result.finding)
+        return int(findings > 0)
     findings = play(arguments.steps, arguments.seed, arguments.length, arguments.rounds)
     return int(findings > 0)
 

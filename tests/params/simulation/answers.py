@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 UNFOUND = "others that were not found in time"
 RECOVERY = 9.5
 """Seconds in which absent replicas have to be waited for; the core takes 10."""
+AN_ANSWER = 0.003
+"""Seconds in which a process finds out which others are stopped."""
 
 
 class Answers:
@@ -73,6 +75,11 @@ class Answers:
             return
         if self.world.closes(process):
             return
+        if (
+            not process.visible
+            and self.world.now < max(process.lost.values(), default=0) + AN_ANSWER
+        ):
+            return  # those that are absent are waited for since the last one is lost
         resent = {self.world.processes[zid].label for zid in call.resent}
         late = (
             line.split("not yet known to ")[1].split(", which did not", maxsplit=1)[0].split(", ")
@@ -109,6 +116,10 @@ class Answers:
     ) -> None:
         """Whoever lacks a write must be named."""
         writes = call.writes
+        labels = [_name(label) for label in result.slow]
+        lives = [other.label for other in self.world.processes.values()]
+        if any(labels.count(label) > max(1, lives.count(label)) for label in labels):
+            fail(self.world, process, f"names somebody twice: {result.slow}")
         reasons = result.reasons if isinstance(result, PartlyWritten) else {}
         named = {_name(label) for label in (*result.slow, *reasons)}
         self._check_holders(process, writes, result.holders)

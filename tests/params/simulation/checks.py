@@ -69,7 +69,7 @@ class Checks:
             for effect in effects:
                 if isinstance(effect, done.Resend) and call.batch == effect.number:
                     call.resent |= set(effect.zids)
-            if isinstance(event, said.StoppedFound):
+            if isinstance(event, said.StoppedPeersFound):
                 call.resent |= event.zids  # nobody sends anything to those
 
     def on_time(self, process: Process) -> None:
@@ -191,6 +191,8 @@ class Checks:
             if not process.core.ready:
                 fail(self.world, process, "is not ready")
             self._check_memory(process)
+        if not processes:  # all were about to end when the quiet time began
+            return
         first = processes[0]
         for process in processes[1:]:
             if process.held != first.held:

@@ -1,11 +1,11 @@
-"""Copies of worlds, and a form of them that tells which are alike; quicker than `copy.deepcopy`."""
+"""Copies of processes, quicker than `copy.deepcopy`, and a form that tells which are alike."""
 
 from __future__ import annotations
 
 import enum
 import itertools
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Final
 
 import msgspec
@@ -26,12 +26,15 @@ _FLAT: Final = frozenset(
 
 _IGNORED: Final = frozenset(
     {
-        *("shown", "seen", "mark", "held", "ever", "gone", "random", "config", "now", "effects"),
-        *("_numbers", "_buckets", "_toggled", "_handlers", "_timers", "root", "deadline", "member"),
-        *("_count", "origin", "known", "woke_at", "stopped_at"),
+        *("shown", "mark", "held", "gone", "random", "config", "now", "effects", "root"),
+        *("_numbers", "_buckets", "_toggled", "_handlers", "_timers", "deadline", "member"),
+        *("_count", "origin", "woke_at", "stopped_at"),
     }
 )
 """Attributes that follow from others, or that say nothing about what happens next."""
+
+
+_NUMBERED: Final = frozenset({"queries", "_queries"})
 
 
 def clone(thing: Any, memo: dict[int, Any]) -> Any:
@@ -128,23 +131,17 @@ _CLONERS: dict[type, _Cloner | None] = {
 
 
 class Form:
-    """The form of a world in which some machines have changed names.
+    """The form of a process or a message, which tells which are alike."""
 
-    Args:
-        names: New name of each session and label.
-    """
-
-    def __init__(self, names: Mapping[str, str]) -> None:
-        self._names = names
+    def __init__(self) -> None:
         self._met: dict[int, int] = {}
         self._forms: dict[type, Callable[[Any], Any]] = {
-            str: lambda text: names.get(text, text),
             list: self._of_list,
             tuple: self._of_list,
             set: self._of_set,
             frozenset: self._of_set,
             dict: self._of_dict,
-            Write: lambda write: (write.path, write.time, self.of(write.clock)),
+            Write: lambda write: (write.path, write.time, write.clock),
         }
 
     def of(self, thing: Any) -> Any:
@@ -176,8 +173,14 @@ class Form:
         if id(thing) in self._met:
             return self._met[id(thing)]
         self._met[id(thing)] = len(self._met)
-        fields = thing.__dict__.items()
-        return tuple([self.of(value) for name, value in fields if name not in _IGNORED])
+        return tuple(
+            [
+                # Queries are alike whatever their numbers; those on their way have others.
+                self.of([value[key] for key in sorted(value)] if name in _NUMBERED else value)
+                for name, value in thing.__dict__.items()
+                if name not in _IGNORED
+            ]
+        )
 
     def _form_of(self, kind: Any) -> Callable[[Any], Any]:
         if issubclass(kind, msgspec.Struct):

@@ -3,82 +3,57 @@
 An exploration begins with a few replicas that know each other. From there it tries everything that
 may happen next: each message and each token may arrive first, each disk may be done, the next timer
 may fire before any of them, the next call may be made, a link may be cut and a process may crash.
-States that are alike are explored once, also if they differ only in the names of replicas that
-nobody calls. From each state in which nothing is left to happen, a quiet time follows.
+From each state in which nothing is left to happen, a quiet time follows.
+
+A state of the world is the numbers of the states of its processes and of what is on its way, so
+that worlds that are alike are explored once. They are alike whatever the numbers of queries, and
+whatever led to them, except for what the checks remember of it. No two replicas are exchangeable:
+the core heeds which one is older.
 """
 
 from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
 
 import msgspec
 
-from rosz.params.paths import Path
 from rosz.params.replica.core import events as said
-from rosz.params.writes import DELETED, Deleted
 
 from .checks import Checks
 from .copies import Form, clone
 from .disk import Disk
 from .process import Process
+from .scripts import Script, Step
+from .stage import Reaction, Sent, Stage, next_due, serves
 from .violation import Violation
-from .world import Deliver, Expire, Finish, Fire, Item, Reconcile, Setting, World
+from .world import World, line_of
 
-_URGENT = frozenset({"delivery", "call", "appeared", "save again", "query the next", "find more"})
-"""Timers that may fire before anything else; the others fire in the quiet time."""
-
-
-class Step(msgspec.Struct, frozen=True):
-    """One call of a process: a value to set, or ``DELETED``.
-
-    Attributes:
-        machine: Machine of the process.
-        path: Path that is written; if empty, the process ends.
-        value: Value.
-    """
-
-    machine: str
-    path: Path
-    value: int | Deleted = 0
-
-
-class Script(msgspec.Struct, frozen=True):
-    """A small world.
-
-    Attributes:
-        setting: What it is made of.
-        steps: Calls, those of one machine in this order.
-        cuts: How often a link may be cut.
-        crashes: How often a process may crash.
-        losses: How many messages may be lost.
-        advances: How many timers may fire early.
-    """
-
-    setting: Setting
-    steps: tuple[Step, ...]
-    cuts: int = 0
-    crashes: int = 0
-    losses: int = 0
-    advances: int = 1
+_QUIET = 45.0
+_LIMIT = 2.0
 
 
 class Result(msgspec.Struct):
     """What an exploration found.
 
     Attributes:
-        states: Number of states.
+        states: Number of states of the world.
+        moves: Number of moves between them.
         ends: Number of states in which nothing was left to happen.
-        steps: Steps of cores.
+        processes: Number of different states of processes, those of quiet times among them.
+        steps: Steps of cores that were made; the others were known.
         finished: Whether all states were explored.
         seconds: How long it took.
         finding: What did not hold.
     """
 
     states: int = 0
+    moves: int = 0
     ends: int = 0
+    processes: int = 0
     steps: int = 0
     finished: bool = True
     seconds: float = 0.0
@@ -86,358 +61,567 @@ class Result(msgspec.Struct):
 
     def __str__(self) -> str:
         end = "all" if self.finished else "not all"
-        text = f"{self.states} states ({end}), {self.ends} ends, {self.steps} steps,"
-        return f"{text} {self.seconds:.1f} s\n{self.finding}".rstrip()
+        return (
+            f"{self.states} states ({end}), {self.moves} moves, {self.ends} ends,"
+            f" {self.processes} states of processes, {self.steps} steps,"
+            f" {self.seconds:.1f} s\n{self.finding}"
+        ).rstrip()
 
 
-class _Chance:
-    """Chance that always decides alike; what depends on order is explored instead."""
+class _Item(NamedTuple):
+    """Something on its way.
 
-    def uniform(self, low: float, _: float) -> float:
-        return low
+    Attributes:
+        kind: ``deliver``, ``look``, ``report`` or ``finish``.
+        zid: Session of the process that it reaches.
+        source: Session that sent it, or of the process to look at; empty if it is its own.
+        event: What is delivered.
+        number: Number of a watch.
+        query: Session and number of the query that it belongs to.
+    """
 
-    def random(self) -> float:
-        return 0.5
-
-    def choice(self, choices: list[Any]) -> Any:
-        return choices[0]
-
-    def sample(self, choices: list[Any], count: int) -> list[Any]:
-        return choices[:count]
-
-    def randint(self, low: int, _: int) -> int:
-        return low
-
-
-class _Chain:
-    """A list whose copies share what they have in common."""
-
-    def __init__(self, last: Any = None) -> None:
-        self.last = last
-
-    def append(self, entry: Any) -> None:
-        self.last = (self.last, entry)
-
-    def __iter__(self) -> Iterator[Any]:
-        entries: list[Any] = []
-        link = self.last
-        while link is not None:
-            link, entry = link
-            entries.append(entry)
-        yield from reversed(entries)
+    kind: str
+    zid: str
+    source: str = ""
+    event: Any = None
+    number: int = 0
+    query: tuple[str, int] | None = None
 
 
-class _SmallWorld(World):
-    """A world whose future is a set of items, of which any may be next."""
+class _State(NamedTuple):
+    """A state of the world.
+
+    Attributes:
+        now: Time in seconds.
+        processes: Number of the state of the process of each machine; 0 if none runs.
+        lives: Number of processes that each machine has had.
+        disks: Number of the disk of each machine without a process.
+        ended: Numbers of the last states of processes that ended.
+        pending: Numbers of what is on its way, sorted.
+        cuts: Links that are cut.
+        left: Numbers of the calls that are still to come.
+        budget: How many cuts, crashes, losses and early timers are left.
+        lossless: Whether no message was lost.
+    """
+
+    now: float
+    processes: tuple[int, ...]
+    lives: tuple[int, ...]
+    disks: tuple[int, ...]
+    ended: tuple[int, ...]
+    pending: tuple[int, ...]
+    cuts: frozenset[tuple[str, str]]
+    left: tuple[int, ...]
+    budget: tuple[int, int, int, int]
+    lossless: bool
+
+
+_Told = list[tuple[str, Any]]
+
+
+class _Draft:
+    """A state that is being made.
+
+    Args:
+        state: The state before.
+
+    Attributes:
+        told: What happened, for a trace.
+    """
+
+    def __init__(self, state: _State) -> None:
+        self.now = state.now
+        self.processes = list(state.processes)
+        self.lives = list(state.lives)
+        self.disks = list(state.disks)
+        self.ended = state.ended
+        self.pending = list(state.pending)
+        self.cuts = state.cuts
+        self.left = state.left
+        self.budget = list(state.budget)
+        self.lossless = state.lossless
+        self.told: _Told = []
+
+
+class Exploration:
+    """All that may happen in a small world.
+
+    Args:
+        script: The small world.
+    """
 
     def __init__(self, script: Script) -> None:
-        self.pending: list[Item] = []
-        self.timers: list[tuple[float, Item]] = []
-        self.left = script.steps
-        self.cuts_left = script.cuts
-        self.crashes_left = script.crashes
-        self.losses_left = script.losses
-        self.advances_left = script.advances
-        self.owned: set[str] = set()
-        self.forms: dict[tuple[str, int], Any] = {}
-        super().__init__(script.setting)
-        self.random = _Chance()  # type: ignore[assignment]
-        self.trace = _Chain()  # type: ignore[assignment]
-        for machine in self.machines:
-            self.start(machine)
-            self.settle(3.0)
+        self.script = script
+        self.stage = Stage(script.setting)
+        self.machines = self.stage.machines
+        self._judge = World(script.setting)
+        self._items: list[_Item] = []
+        self._numbers: dict[Any, int] = {}
+        self._item_of: dict[tuple[int, str, str], tuple[int, said.Event]] = {}
+        self._reactions: dict[Any, Reaction] = {}
+        self._disks: list[Disk | None] = [None]
+        self._calm: set[int] = set()
+        self._judged: set[int] = set()
+
+    def first(self) -> _State:
+        """Return the state in which all replicas know each other, and have written once."""
+        script = self.script
+        count = len(self.machines)
+        none = (0,) * count
+        disks = tuple(
+            self._number_of_disk(self.stage.disks.get(machine)) for machine in self.machines
+        )
+        budget = (script.cuts, script.crashes, script.losses, script.advances)
+        left = tuple(range(len(script.steps)))
+        draft = _Draft(
+            _State(100.0, none, none, disks, (), (), frozenset(), left, budget, lossless=True)
+        )
+        for index in range(count):
+            self._start(draft, index)
+            self._settle(draft, 3.0)
         for machine in sorted({step.machine for step in script.steps}):
-            self.write(machine, [(("w", machine), 0)])
-            self.settle(3.0)
+            self._call(draft, self.machines.index(machine), -1)
+            self._settle(draft, 3.0)
+        draft.told = []
+        return self._freeze(draft)
 
-    def later(self, delay: float, item: Item) -> None:
-        if isinstance(item, (Fire, Expire)):
-            self.timers.append((self.now + delay, item))
-        elif not (isinstance(item, (Reconcile, Finish)) and item in self.pending):
-            self.pending.append(item)
+    # States
 
-    def start(self, machine: str, handover: Any = None) -> None:
-        if machine in self.running:
+    def _process(self, draft: _Draft, index: int) -> Process | None:
+        number = draft.processes[index]
+        return self.stage.states[number] if number else None
+
+    def _at(self, draft: _Draft, zid: str) -> int:
+        """Return the index of the machine of a process that runs; -1 if it does not."""
+        index = self.machines.index(zid[0])
+        process = self._process(draft, index)
+        return index if process is not None and process.zid == zid else -1
+
+    def _freeze(self, draft: _Draft) -> _State:
+        pending = [number for number in draft.pending if self._matters(draft, number)]
+        draft.pending = sorted(pending)
+        return _State(
+            draft.now,
+            tuple(draft.processes),
+            tuple(draft.lives),
+            tuple(draft.disks),
+            draft.ended,
+            tuple(draft.pending),
+            draft.cuts,
+            draft.left,
+            tuple(draft.budget),  # type: ignore[arg-type]
+            draft.lossless,
+        )
+
+    def _matters(self, draft: _Draft, number: int) -> bool:
+        """Tell whether something on its way can change anything.
+
+        A look that shows nothing new does not: whatever changes makes others look again.
+        """
+        item = self._items[number]
+        index = self._at(draft, item.zid)
+        if index < 0:
+            return False
+        if item.kind != "look":
+            return True
+        process = self.stage.states[draft.processes[index]]
+        other, linked = self._look(draft, process, item.source)
+        seed, member = (other.seed and linked, other.token and linked) if other else (False, False)
+        is_known = item.source in process.seeds
+        watched = process.watching and member != (item.source in process.members)
+        return seed != is_known or watched
+
+    def _look(self, draft: _Draft, process: Process, zid: str) -> tuple[Process | None, bool]:
+        """Return another process if it runs, and whether both are linked."""
+        index = self._at(draft, zid)
+        other = self._process(draft, index) if index >= 0 else None
+        here, there = process.machine, zid[0]
+        return other, (here, there) not in draft.cuts and (there, here) not in draft.cuts
+
+    def _number(self, item: _Item) -> int:
+        """Return the number of something on its way."""
+        form = (item.kind, item.zid, item.source, item.number, Form().of(item.event))
+        number = self._numbers.get(form)
+        if number is None:
+            number = self._numbers[form] = len(self._items)
+            self._items.append(item)
+        return number
+
+    def _number_of_disk(self, disk: Disk | None) -> int:
+        if disk is None:
+            return 0
+        form = Form().of(disk)
+        for number, other in enumerate(self._disks):
+            if other is not None and Form().of(other) == form:
+                return number
+        self._disks.append(disk)
+        return len(self._disks) - 1
+
+    # Steps of processes
+
+    def _react(self, draft: _Draft, index: int, key: Any, do: Callable[[Process], object]) -> None:
+        """Let a process do something, and carry out what comes of it."""
+        number = draft.processes[index]
+        process = self.stage.states[number]
+        taken = tuple(
+            query[1]
+            for query in (self._items[item].query for item in draft.pending)
+            if query is not None and query[0] == process.zid
+        )
+        full = number, key, draft.now, taken
+        reaction = self._reactions.get(full)
+        if reaction is None:
+            reaction = self._reactions[full] = self.stage.react(process, draft.now, taken, do)
+        self._carry_out(draft, index, reaction)
+
+    def _carry_out(self, draft: _Draft, index: int, reaction: Reaction) -> None:
+        draft.told += reaction.told
+        if reaction.asked:
+            self._judge_answers(draft, index, reaction)
+        draft.processes[index] = reaction.after
+        process = self.stage.states[reaction.after]
+        for sent in reaction.sent:
+            self._carry(draft, index, process, sent)
+
+    def _judge_answers(self, draft: _Draft, index: int, reaction: Reaction) -> None:
+        """Check what the answers of a process promise, given what all others have."""
+        others = tuple(other for at, other in enumerate(draft.processes) if at != index)
+        case = id(reaction), others, draft.ended, draft.cuts, draft.lossless, draft.now
+        if hash(case) in self._judged:
             return
-        self.owned.add(f"{machine}{self.lives[machine] + 1}")
-        super().start(machine, handover)
+        for asked in reaction.asked:
+            judge = self._set_up(draft, asked.process)
+            judge.checks.answers.on_answer(asked.process, asked.answer, asked.effects)
+        self._judged.add(hash(case))
 
-    def step(self, process: Process, event: said.Event) -> None:
-        process.core._work.random = self.random
-        super().step(process, event)
+    def _carry(self, draft: _Draft, index: int, process: Process, sent: Sent) -> None:
+        zid, others = process.zid, self._others(draft, index)
+        if sent.kind in {"one", "query"}:
+            others = [other for other in others if other.zid == sent.target]
+        if sent.kind == "end":
+            draft.processes[index] = 0
+            draft.disks[index] = self._number_of_disk(process.disk)
+            draft.ended = tuple(sorted({*draft.ended, self._remains(process)}))
+        if sent.kind in {"end", "show"}:
+            for other in others:
+                self._add(draft, _Item("look", other.zid, zid))
+        elif sent.kind in {"finish", "report"}:
+            self._add(draft, _Item(sent.kind, zid, number=sent.number))
+        elif sent.kind == "own":
+            self._send(draft, zid, sent.event, "")
+        elif sent.kind == "query" and not others:
+            self._send(draft, zid, said.QueryEnded(sent.number, None), "")
+        for other in others if sent.kind in {"one", "all", "query"} else ():
+            if (process.machine, other.machine) in draft.cuts:
+                draft.lossless = False
+            else:
+                self._send(draft, other.zid, sent.event, zid)
 
-    def fork(self) -> _SmallWorld:
-        """Return a copy; its processes are copied when they change."""
-        made = object.__new__(_SmallWorld)
-        made.__dict__.update(self.__dict__)
-        for name in ("processes", "running", "disks", "lives", "cuts", "severed", "batches"):
-            setattr(made, name, getattr(self, name).copy())
-        for name in ("registry", "queries", "pending", "timers", "forms"):
-            setattr(made, name, getattr(self, name).copy())
-        made.trace = _Chain(self.trace.last)  # type: ignore[assignment, attr-defined]
-        made._count = itertools.count(int(repr(self._count)[6:-1]))
-        made._values = itertools.count(int(repr(self._values)[6:-1]))
-        made.checks = Checks(made)
-        made.owned = set()
-        return made
+    def _add(self, draft: _Draft, item: _Item) -> None:
+        number = self._number(item)
+        if number not in draft.pending:
+            draft.pending.append(number)
 
-    def own(self, zid: str) -> None:
-        """Copy a process that other worlds may share."""
-        if zid not in self.owned:
-            self.owned.add(zid)
-            self.forms = {key: form for key, form in self.forms.items() if key[0] != zid}
-            process: Process = clone(self.processes[zid], {})
-            self.processes[zid] = process
-            present = self.running.get(process.machine)
-            if present is not None and present.zid == zid:
-                self.running[process.machine] = process
-                if process.disk is not None:
-                    self.disks[process.machine] = process.disk
+    def _send(self, draft: _Draft, zid: str, event: said.Event, source: str) -> None:
+        place = id(event), zid, source
+        if place not in self._item_of:
+            query: tuple[str, int] | None = None
+            if isinstance(event, said.QueryEnded):
+                query = zid, event.number
+            elif isinstance(event, (said.SyncReceived, said.WritesReceived)):
+                query = self.stage.asker(event.query)
+            # The event is kept, and so its id is not given to another one.
+            number = self._number(_Item("deliver", zid, source, event, 0, query))
+            self._item_of[place] = number, event
+        draft.pending.append(self._item_of[place][0])
 
-    def happen(self, item: Item) -> None:
-        zid = getattr(item, "zid", "")
-        if zid:
-            self.own(zid)
-        super().happen(item)
+    def _others(self, draft: _Draft, index: int) -> list[Process]:
+        every = (self._process(draft, other) for other in range(len(self.machines)))
+        return [other for at, other in enumerate(every) if other is not None and at != index]
+
+    def _remains(self, process: Process) -> int:
+        """Return the number of a process that ended, of which only its writes matter."""
+        form = "ended", process.zid, Form().of(process.core.history)
+        if form not in self._numbers:
+            self._numbers[form] = len(self.stage.states)
+            self.stage.states.append(process)
+        return self._numbers[form]
+
+    def _set_up(self, draft: _Draft, *replaced: Process) -> World:
+        """Return the world of a state, for checks that need all of it."""
+        judge = self._judge
+        every = [self.stage.states[number] for number in draft.processes if number]
+        running = {process.machine: process for process in every}
+        running |= {process.machine: process for process in replaced}
+        ended = {self.stage.states[number].zid: self.stage.states[number] for number in draft.ended}
+        judge.now, judge.running, judge.cuts = draft.now, running, set(draft.cuts)
+        judge.processes = ended | {process.zid: process for process in running.values()}
+        judge.lossless = draft.lossless
+        return judge
 
     # What may be next
 
-    def successors(self) -> Iterator[_SmallWorld]:
-        """Yield the world after each thing that may be next."""
-        for index, item in enumerate(self.pending):
-            if item not in self.pending[:index]:
-                yield self._after_item(index)
-                if self.losses_left and isinstance(item, Deliver) and item.source:
-                    made = self.fork()
-                    made.losses_left -= 1
-                    made.lossless = False
-                    del made.pending[index]
-                    yield made
-        for machine in {step.machine for step in self.left}:
-            process = self.running.get(machine)
-            if process is not None and self.serves(process):
-                yield self._after_call(machine)
-        # What a machine finds out about itself is there before the next timer.
-        is_local = any(isinstance(item, Deliver) and not item.source for item in self.pending)
-        may_advance = self.advances_left and not is_local
-        if may_advance and any(_is_urgent(item) for _, item in self.timers):
-            made = self.fork()
-            made.advances_left -= 1
-            made.advance()
-            yield made
-        yield from self._after_faults()
+    def successors(self, state: _State) -> Iterator[tuple[_State, _Told]]:
+        """Yield the state after each thing that may be next, and what happens."""
+        for draft in self._drafts(state):
+            yield self._freeze(draft), draft.told
 
-    def _after_item(self, index: int) -> _SmallWorld:
-        made = self.fork()
-        made.happen(made.pending.pop(index))
-        return made
+    def _drafts(self, state: _State) -> Iterator[_Draft]:
+        may_advance = bool(state.budget[3])
+        for number in dict.fromkeys(state.pending):
+            item = self._items[number]
+            draft = _Draft(state)
+            self._happen(draft, number)
+            yield draft
+            # What a machine finds out about itself is there before the next timer.
+            may_advance = may_advance and (item.kind != "deliver" or bool(item.source))
+            if state.budget[2] and item.kind == "deliver" and item.source:
+                draft = _Draft(state)
+                draft.budget[2] -= 1
+                draft.lossless = False
+                draft.pending.remove(number)
+                draft.told = [(item.zid, f"-- does not get {item.event!r:.200}")]
+                yield draft
+        for index in sorted(
+            {self.machines.index(self.script.steps[call].machine) for call in state.left}
+        ):
+            number = state.processes[index]
+            if number and serves(self.stage.states[number]):
+                draft = _Draft(state)
+                self._call_next(draft, index)
+                yield draft
+        if may_advance:
+            draft = _Draft(state)
+            if self._advance(draft, urgent=True):
+                draft.budget[3] -= 1
+                yield draft
+        yield from self._faults(state)
 
-    def _after_call(self, machine: str) -> _SmallWorld:
-        made = self.fork()
-        step = next(step for step in made.left if step.machine == machine)
-        index = made.left.index(step)
-        made.left = made.left[:index] + made.left[index + 1 :]
-        process = made.running[machine]
-        made.own(process.zid)
-        if step.path:
-            made.write(machine, [(step.path, step.value)])
+    def _faults(self, state: _State) -> Iterator[_Draft]:
+        goes_on = bool(state.left or state.pending)
+        for one, other in itertools.combinations(self.machines, 2):
+            is_cut = (one, other) in state.cuts
+            if (is_cut or state.budget[0]) and goes_on:
+                draft = _Draft(state)
+                draft.budget[0] -= not is_cut
+                self._turn(draft, one, other)
+                yield draft
+        for index, number in enumerate(state.processes):
+            if not number:
+                draft = _Draft(state)
+                self._start(draft, index)
+                yield draft
+            elif state.budget[1] and goes_on:
+                draft = _Draft(state)
+                draft.budget[1] -= 1
+                self._crash(draft, index)
+                yield draft
+
+    # What happens
+
+    def _happen(self, draft: _Draft, number: int) -> None:
+        """Let something that is on its way happen."""
+        draft.pending.remove(number)
+        item = self._items[number]
+        index = self._at(draft, item.zid)
+        if index < 0:
+            return
+        stage, process = self.stage, self.stage.states[draft.processes[index]]
+        if item.kind == "finish":
+            self._react(draft, index, number, stage.finish)
+        elif item.kind == "look":
+            other, linked = self._look(draft, process, item.source)
+            if other is None:
+                other = next(p for p in reversed(stage.states) if _is_named(p, item.source))
+                linked = False
+            shown = (other.member.start, other.seed and linked, other.token and linked)
+            do = partial(stage.look, other=other, linked=linked)
+            self._react(draft, index, (number, shown), do)
+        elif item.kind == "report":
+            if process.watch == item.number:
+                seen = [
+                    other
+                    for other in self._others(draft, index)
+                    if other.token and self._look(draft, process, other.zid)[1]
+                ]
+                key = number, tuple((other.zid, other.member.start) for other in seen)
+                do = partial(stage.report, watch=item.number, others=seen)
+                self._react(draft, index, key, do)
+        elif item.source and (item.source[0], process.machine) in draft.cuts:
+            draft.lossless = False
         else:
-            process = made.running[machine]
-            made.call(process, said.CloseCalled(made.number()), 1.0)
-        return made
+            self._react(draft, index, number, partial(stage.take, event=item.event))
 
-    def _after_faults(self) -> Iterator[_SmallWorld]:
-        machines = self.machines
-        for one, other in itertools.combinations(machines, 2):
-            is_cut = (one, other) in self.cuts
-            if (is_cut or self.cuts_left) and (self.left or self.pending):
-                made = self.fork()
-                for source, target in ((one, other), (other, one)):
-                    if is_cut:
-                        made.mend(source, target)
-                    else:
-                        made.cut(source, target)
-                made.cuts_left -= not is_cut
-                yield made
-        for machine in machines:
-            process = self.running.get(machine)
-            if process is None:
-                made = self.fork()
-                made.start(machine)
-                yield made
-            elif self.crashes_left and (self.left or self.pending):
-                made = self.fork()
-                made.own(process.zid)
-                made.crashes_left -= 1
-                made.crash(machine)
-                yield made
+    def _call_next(self, draft: _Draft, index: int) -> None:
+        machine = self.machines[index]
+        call = next(call for call in draft.left if self.script.steps[call].machine == machine)
+        draft.left = tuple(other for other in draft.left if other != call)
+        self._call(draft, index, call)
 
-    def advance(self) -> None:
-        """Let the next timer fire that may fire early."""
-        due = min(
-            (entry for entry in self.timers if _is_urgent(entry[1])), key=lambda entry: entry[0]
+    def _call(self, draft: _Draft, index: int, call: int) -> None:
+        """Let a process make a call; -1 is the one before all others."""
+        machine = self.machines[index]
+        step = self.script.steps[call] if call >= 0 else Step(machine, ("w", machine))
+        process = self.stage.states[draft.processes[index]]
+        event: said.Event
+        if step.path:
+            # Each call has stamps of its own, whatever the order.
+            stamp = process.wall(draft.now) + 1000 * call, process.zid
+            changes = [(step.path, step.value)]
+            event = said.WriteCalled(1000 + call, changes, process.label, stamp, timeout=_LIMIT)
+        else:
+            event = said.CloseCalled(1000 + call)
+        limit = _LIMIT if step.path else 1.0
+        do = partial(self.stage.ask, event=event, limit=limit)
+        self._react(draft, index, ("call", call), do)
+
+    def _advance(self, draft: _Draft, *, urgent: bool, until: float = float("inf")) -> bool:
+        """Let the next timer fire; return whether there is one."""
+        dues = [
+            (*due, index)
+            for index, number in enumerate(draft.processes)
+            if number and (due := next_due(self.stage.states[number], urgent=urgent))
+        ]
+        if not dues:
+            return False
+        due_at, key, index = min(dues, key=lambda entry: (entry[0], entry[2]))
+        if due_at > until:
+            return False
+        draft.now = max(draft.now, due_at)
+        self._react(draft, index, ("fire", key), partial(self.stage.fire, key=key))
+        return True
+
+    def _turn(self, draft: _Draft, one: str, other: str) -> None:
+        """Cut a link, or mend it."""
+        is_cut = (one, other) in draft.cuts
+        draft.told = [(one, f"-- the link to {other} is {'mended' if is_cut else 'cut'}")]
+        draft.cuts = draft.cuts ^ {(one, other), (other, one)}
+        here, there = (self._process(draft, self.machines.index(name)) for name in (one, other))
+        if here is not None and there is not None:
+            self._add(draft, _Item("look", here.zid, there.zid))
+            self._add(draft, _Item("look", there.zid, here.zid))
+
+    def _crash(self, draft: _Draft, index: int) -> None:
+        process: Process = clone(self.stage.states[draft.processes[index]], {})
+        if process.disk is not None:
+            process.disk.crash()
+        process.end()
+        draft.told = [(process.zid, "-- crashes")]
+        self._carry(draft, index, process, Sent("end"))
+
+    def _start(self, draft: _Draft, index: int) -> None:
+        others = self._others(draft, index)
+        disk = self._disks[draft.disks[index]]
+        reaction = self.stage.boot(
+            self.machines[index], draft.lives[index], disk, others, draft.cuts, draft.now
         )
-        self.timers.remove(due)
-        self.now = max(self.now, due[0])
-        self.happen(due[1])
+        draft.lives[index] += 1
+        draft.disks[index] = 0
+        self._carry_out(draft, index, reaction)
 
     # The quiet time
 
-    def settle(self, seconds: float) -> None:
-        """Let all happen in the order in which it began, for some time."""
-        until = self.now + seconds
+    def _settle(self, draft: _Draft, seconds: float, *, calm: bool = False) -> bool:
+        """Let all happen in one order, for some time.
+
+        Args:
+            draft: The state.
+            seconds: The time.
+            calm: Whether to stop in a state that has come to rest before.
+
+        Returns:
+            Whether it did not stop.
+        """
+        until = draft.now + seconds
+        passed: list[int] = []
         while True:
-            while self.pending:
-                self.now += 0.0001
-                self.happen(self.pending.pop(0))
-            due = min(self.timers, key=lambda entry: entry[0], default=None)
-            if due is None or due[0] > until:
-                break
-            self.timers.remove(due)
-            self.now = max(self.now, due[0])
-            self.happen(due[1])
-        self.now = max(self.now, until)
+            state = self._freeze(draft)
+            if calm:
+                passed.append(hash(state))
+                if passed[-1] in self._calm:
+                    break
+            if draft.pending:
+                self._happen(draft, draft.pending[0])
+            elif not self._advance(draft, urgent=False, until=until):
+                draft.now = until
+                self._calm.update(passed)
+                return True
+        self._calm.update(passed)
+        return False
 
-    def finish(self) -> int:
-        """Mend everything, wait, and check what must hold then; return the number of steps."""
-        made = self.fork()
-        for source, target in sorted(made.cuts):
-            made.mend(source, target)
-        for machine in made.machines:
-            made.start(machine)
-        made.settle(45.0)
-        made.checks.on_quiet()
-        return made.steps - self.steps
-
-    # States that are alike
-
-    def form(self, free: list[str]) -> int:
-        """Return a number that is equal for states that are alike, whatever the free names."""
-        orders = itertools.permutations(free)
-        return min(
-            self._form(dict(zip(free, order, strict=True)), index)
-            for index, order in enumerate(orders)
-        )
-
-    def _form(self, renamed: dict[str, str], index: int) -> int:
-        names: dict[str, str] = {}
-        for old, new in renamed.items():
-            names |= {old: new, f"process {old}": f"process {new}"}
-            names |= {f"{old}{life}": f"{new}{life}" for life in range(1, 4)}
-        form = Form(names)
-        processes = []
-        for process in self.running.values():
-            known = self.forms.get((process.zid, index))
-            if known is None:
-                known = hash((form.of(process.zid), _form_of(process, names)))
-                self.forms[process.zid, index] = known
-            processes.append(known)
-        disks = [(form.of(name), _form_of(disk, names)) for name, disk in self._idle_disks()]
-        whole = (
-            frozenset(processes),
-            frozenset(disks),
-            frozenset(_counted(self._form_item(item, form) for item in self.pending)),
-            frozenset(
-                _counted(
-                    (round(due - self.now, 3), self._form_item(item, form))
-                    for due, item in self.timers
-                    if _is_urgent(item)
-                )
-            ),
-            form.of(self.cuts),
-            form.of(self.left),
-            (self.cuts_left, self.crashes_left, self.losses_left, self.advances_left),
-        )
-        return hash(whole)
-
-    def _idle_disks(self) -> Iterator[tuple[str, Disk]]:
-        for name, disk in self.disks.items():
-            if name not in self.running:
-                yield name, disk
-
-    def _form_item(self, item: Item, form: Form) -> Any:
-        if isinstance(item, Deliver):
-            query = getattr(item.event, "query", 0)
-            asker = form.of(self._asker(query)) if query else ()
-            if query:
-                item = Deliver(item.zid, msgspec.structs.replace(item.event, query=0), item.source)
-            return asker, form.of(item)
-        if isinstance(item, Fire):
-            return form.of((item.zid, item.timer.kind, item.timer.number, item.call))
-        return form.of(item)
+    def finish(self, state: _State) -> None:
+        """Mend everything, wait, and check what must hold then."""
+        draft = _Draft(state)
+        draft.left, draft.budget = (), [0, 0, 0, 0]
+        for one, other in itertools.combinations(self.machines, 2):
+            if (one, other) in draft.cuts:
+                self._turn(draft, one, other)
+        for index, number in enumerate(state.processes):
+            if not number:
+                self._start(draft, index)
+        draft.told = []
+        try:
+            if self._settle(draft, _QUIET, calm=True):
+                Checks(self._set_up(draft)).on_quiet()
+        except Violation as violation:
+            raise Violation(f"{violation}\nin the quiet time:\n{_story(draft.told)}") from None
 
 
-def _form_of(thing: Any, names: dict[str, str]) -> Any:
-    return Form(names).of(thing)
+def _is_named(process: Process, zid: str) -> bool:
+    return getattr(process, "zid", "") == zid
 
 
-def _counted(forms: Iterator[Any]) -> list[tuple[Any, int]]:
-    counts: dict[Any, int] = {}
-    for form in forms:
-        counts[form] = counts.get(form, 0) + 1
-    return list(counts.items())
+def _story(told: _Told) -> str:
+    return "\n".join(f"{zid:3} {line_of(what)}" for zid, what in told)
 
 
-def _is_urgent(item: Item) -> bool:
-    return isinstance(item, Expire) or (isinstance(item, Fire) and item.timer.kind in _URGENT)
+def explore(
+    script: Script, most: int = 1_000_000, tell: Callable[[Result, int], object] = lambda *_: None
+) -> Result:
+    """Explore all that may happen in a small world, up to a number of states.
 
-
-def explore(script: Script, most: int = 1_000_000) -> Result:
-    """Explore all that may happen in a small world, up to a number of states."""
+    Args:
+        script: The small world.
+        most: Number of states to stop at.
+        tell: Function called from time to time, with the result so far and the number of states
+            that wait.
+    """
     begun, result = time.monotonic(), Result()
-    called = {step.machine for step in script.steps}
+    path: Any = None
+    exploration = Exploration(script)
     try:
-        first = _SmallWorld(script)
-        free = [machine for machine in first.machines if machine not in called]
-        met = {first.form(free)}
-        stack = [first]
+        first = exploration.first()
+        met = {hash(first)}
+        stack: list[tuple[_State, Any]] = [(first, None)]
         while stack:
-            world = stack.pop()
-            result.states += 1
             if result.states >= most:
                 result.finished = False
                 break
+            state, path = stack.pop()
+            result.states += 1
+            if not result.states % 10_000:
+                result.seconds = time.monotonic() - begun
+                tell(result, len(stack))
             is_end = True
-            for successor in world.successors():
+            for successor, told in exploration.successors(state):
                 is_end = False
-                result.steps += successor.steps - world.steps
-                form = successor.form(free)
+                result.moves += 1
+                form = hash(successor)
                 if form not in met:
                     met.add(form)
-                    stack.append(successor)
+                    stack.append((successor, (path, told)))
             if is_end:
                 result.ends += 1
-                result.steps += world.finish()
+                exploration.finish(state)
     except Violation as violation:
-        result.finding = str(violation)
+        steps: list[_Told] = []
+        while path is not None:
+            path, told = path
+            steps.append(told)
+        story = _story([line for told in reversed(steps) for line in told])
+        result.finding = f"{violation}\nafter:\n{story}"
         result.finished = False
+    result.processes = len(exploration.stage.states)
+    result.steps = exploration.stage.steps
     result.seconds = time.monotonic() - begun
     return result
-
-
-A, B = ("a",), ("a", "b")
-_TWO = Setting(machines=2)
-_TWO_STORED = Setting(machines=2, stored=3)
-_THREE = Setting(machines=3)
-_THREE_STORED = Setting(machines=3, stored=1)
-_END = Step("a", ())
-
-SCRIPTS: dict[str, Script] = {
-    "two": Script(_TWO, (Step("a", A, 1), Step("b", B, 2))),
-    "two, cut": Script(_TWO, (Step("a", A, 1), Step("b", A, 2)), cuts=1),
-    "two, crash": Script(_TWO, (Step("a", A, 1), Step("b", B, 2)), crashes=1),
-    "two, stored, crash": Script(_TWO_STORED, (Step("a", A, 1), Step("b", B, 2)), crashes=1),
-    "two, loss": Script(_TWO, (Step("a", A, 1), Step("b", B, 2)), losses=1, advances=2),
-    "two, end": Script(_TWO, (Step("a", A, 1), _END), cuts=1, losses=1),
-    "two, four": Script(
-        _TWO, (Step("a", A, 1), Step("a", A, DELETED), Step("b", B, 2), Step("b", A, 3)), 1, 1
-    ),
-    "three": Script(_THREE, (Step("a", A, 1), Step("b", B, 2))),
-    "three, one": Script(_THREE, (Step("a", A, 1),), cuts=1, crashes=1),
-    "three, cut": Script(_THREE, (Step("a", A, 1), Step("b", B, 2)), cuts=1),
-    "three, crash": Script(_THREE, (Step("a", A, 1), Step("a", B, 2)), crashes=1),
-    "three, stored": Script(_THREE_STORED, (Step("a", A, 1), Step("b", B, 2)), crashes=1),
-    "three, four": Script(
-        _THREE, (Step("a", A, 1), Step("a", A, DELETED), Step("b", B, 2), Step("b", A, 3)), 1, 1
-    ),
-}

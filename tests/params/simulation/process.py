@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -57,6 +57,14 @@ class Call(msgspec.Struct):
     known: dict[str, dict[Order, Write]] = {}
 
 
+class Alarm(NamedTuple):
+    """A timer that an exploration may let fire."""
+
+    due: float
+    kind: str
+    number: int
+
+
 class Process:
     """One life of a program on a machine.
 
@@ -96,6 +104,11 @@ class Process:
         self.calls: dict[int, Call] = {}
         self.timers: dict[int, int] = {}
         self.mailbox: list[Any] = []
+        # What only an exploration needs: timers, the number and time limit of each query, and
+        # batches whose acknowledgement waits for the disk.
+        self.alarms: dict[Any, Alarm] = {}
+        self.queries: dict[int, tuple[int, float]] = {}
+        self.received: dict[tuple[str, int], list[Write]] = {}
         # What it holds, held and has lost to newer writes.
         self.held: dict[Order, Write] = {}
         self.ever: dict[Order, Write] = {}
@@ -125,6 +138,13 @@ class Process:
         """Tell whether it holds writes, or newer ones in their place, in memory."""
         history = self.core.history
         return all(history.hides(write) or write.time <= history.horizon for write in writes)
+
+    def end(self) -> None:
+        """Let nothing be left of it but its disk."""
+        self.state = State.ENDED
+        if self.disk is not None and self.disk.pending:
+            self.disk.finish(len(self.disk.pending))
+        self.token = self.seed = False
 
     def show(self, effect: TreeChanged) -> None:
         """Tell the watchers of some paths a change, as `rosz.params.replica.watch` does."""

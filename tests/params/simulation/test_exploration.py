@@ -6,8 +6,10 @@ import os
 
 import pytest
 
-from .exploration import SCRIPTS, explore
-from .mutations import faulty, takes_an_acknowledgement_for_the_newest_batch
+from . import mutations
+from .exploration import explore
+from .mutations import Mutation, faulty
+from .scripts import SCRIPTS
 
 MOST = int(os.environ.get("ROSZ_EXAMPLES", "100")) * 3
 
@@ -19,12 +21,30 @@ def test_what_must_hold_holds_in_every_order(name: str) -> None:
     assert not result.finding
 
 
-def test_all_of_a_small_world_is_explored() -> None:
-    result = explore(SCRIPTS["two"], 2000)
-    assert result.finished
+@pytest.mark.parametrize("name", ["two", "two, loss"])
+def test_all_of_a_small_world_is_explored(name: str) -> None:
+    result = explore(SCRIPTS[name], 5000)
+    print(f"{name}: {result}")
+    assert result.finished, result.finding
     assert result.ends
 
 
-def test_a_fault_is_found() -> None:
-    with faulty(takes_an_acknowledgement_for_the_newest_batch):
-        assert explore(SCRIPTS["two, four"], 2000).finding
+@pytest.mark.parametrize(
+    ("mutation", "name"),
+    [
+        (mutations.acknowledges_before_the_disk, "two, stored"),
+        (mutations.answers_before_the_own_disk, "two, stored"),
+        (mutations.takes_an_acknowledgement_for_the_newest_batch, "two, four"),
+        (mutations.never_sends_again, "two, cut"),
+        (mutations.waits_without_a_limit, "two, cut"),
+        (mutations.does_not_miss_whom_it_lost, "two, cut"),
+        (mutations.never_forgets_a_member, "two, end"),
+        (mutations.leaves_without_handing_over, "two, end"),
+    ],
+    ids=lambda value: getattr(value, "__name__", value),
+)
+def test_a_fault_is_found(mutation: Mutation, name: str) -> None:
+    with faulty(mutation):
+        result = explore(SCRIPTS[name], 2000)
+    print(f"{mutation.__name__}: {result.states} states: {result.finding.splitlines()[:1]}")
+    assert result.finding

@@ -26,9 +26,12 @@ def test_what_must_hold_holds(setting: Setting, seed: int, actions: list[Action]
     play(setting, seed, actions)
 
 
-@pytest.mark.parametrize("seed", [227, 611, 786, 2233])
-def test_what_once_failed_holds(seed: int) -> None:
-    play_seed(seed, 40)
+@pytest.mark.parametrize(
+    ("seed", "length", "rounds"),
+    [(227, 40, 1), (611, 40, 1), (786, 40, 1), (2233, 40, 1), (2870001056, 90, 2)],
+)
+def test_what_once_failed_holds(seed: int, length: int, rounds: int) -> None:
+    play_seed(seed, length, rounds)
 
 
 def test_a_long_history_holds() -> None:

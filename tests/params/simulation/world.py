@@ -426,7 +426,7 @@ class World:
         for other in self.others(process):
             if self.sees(process, other):
                 process.members.add(other.zid)
-                process.met.add(other.zid)
+                self._is_found(process, other)
                 self.step(process, said.MemberCame(item.watch, other.member))
         for zid in sorted(process.seeds - process.members):
             process.lost[zid] = self.now
@@ -441,15 +441,10 @@ class World:
             visible = self.sees(process, other, seed=seed)
             if not watched or visible == (other.zid in known):
                 continue
-            before = process.visible
+            before = process.visible.copy()
             if visible:
                 known.add(other.zid)
-                process.met.add(other.zid)
-                process.lost = {
-                    zid: time
-                    for zid, time in process.lost.items()
-                    if self.processes[zid].machine != other.machine
-                }
+                self._is_found(process, other)
                 came = other.member
                 self.step(
                     process,
@@ -463,6 +458,14 @@ class World:
                     process,
                     said.SeedWent(other.zid) if seed else said.MemberWent(process.watch, other.zid),
                 )
+
+    def _is_found(self, process: Process, other: Process) -> None:
+        process.met.add(other.zid)
+        process.lost = {
+            zid: time
+            for zid, time in process.lost.items()
+            if self.processes[zid].machine != other.machine
+        }
 
     # Effects
 
@@ -500,7 +503,7 @@ class World:
             self._send(process, effect.zid, said.SyncReceived(query, effect.request))
 
     def _do_reply(self, process: Process, effect: done.Reply) -> None:
-        zid, number = self._asker(effect.query)
+        zid, number = self.asker(effect.query)
         if isinstance(effect.reply, str):
             self._send(process, zid, said.QueryEnded(number, None, failed=True))
         else:
@@ -566,8 +569,8 @@ class World:
         process.token = process.seed = False
         self._show(process)
 
-    def _do_findstopped(self, process: Process, _: done.FindStopped) -> None:
-        self._deliver(process.zid, said.StoppedFound(self.stopped()), "")
+    def _do_findstoppedpeers(self, process: Process, _: done.FindStoppedPeers) -> None:
+        self._deliver(process.zid, said.StoppedPeersFound(self.stopped()), "")
 
     def stopped(self) -> frozenset[str]:
         """Return the sessions of processes that stand still."""
@@ -629,10 +632,7 @@ class World:
             self._reconcile(there, here, lost=lost)
 
     def _end(self, process: Process) -> None:
-        process.state = State.ENDED
-        if process.disk is not None and process.disk.pending:
-            process.disk.finish(len(process.disk.pending))
-        process.token = process.seed = False
+        process.end()
         self.severed.discard(process.zid)
         for other in self.others(process):
             self._reconcile(other, process, lost=True)
@@ -642,7 +642,8 @@ class World:
         index = "abcdefgh".index(process.machine)
         return ((process.life * 8 + index) * 1_000_000 + abs(number)) * 2 + (number < 0)
 
-    def _asker(self, query: int) -> tuple[str, int]:
+    def asker(self, query: int) -> tuple[str, int]:
+        """Return the session and the number of a query."""
         rest, number = divmod(query // 2, 1_000_000)
         life, index = divmod(rest, 8)
         return f"{'abcdefgh'[index]}{life}", number
@@ -655,11 +656,12 @@ class World:
 
     def story(self, last: int = 3000) -> str:
         """Return the trace as text."""
-        lines = [f"{time:9.4f} {zid:3} {_line(what)}" for time, zid, what in self.trace]
+        lines = [f"{time:9.4f} {zid:3} {line_of(what)}" for time, zid, what in self.trace]
         return "\n".join(lines[-last:])
 
 
-def _line(what: Any) -> str:
+def line_of(what: Any) -> str:
+    """Return a line of a trace: what a process was told or did."""
     if isinstance(what, str):
         return f"-- {what}"
     head = "  =>" if isinstance(what, done.Effect) else "<="

@@ -32,7 +32,9 @@ SERVER = """
                 return
             total += number
             server.publish_feedback(CountFeedback(number))
-            rospy.sleep(0.2)  # clients take the feedback before the result
+            # A result may overtake feedback, which is then ignored.
+            while rospy.get_param("/taken", 0) < number and not server.is_preempt_requested():
+                rospy.sleep(0.01)
         server.set_succeeded(CountResult(total), "counted")
 
     rospy.init_node("server")
@@ -69,11 +71,14 @@ def test_goals(network: Network, path: str) -> None:
         CLIENT
         + """
     heard = []
+    def take(feedback):
+        heard.append(feedback.now)
+        rospy.set_param("/taken", feedback.now)
     client.send_goal(
         CountGoal(4),
         done_cb=lambda state, result: heard.append(("done", state, result.sum)),
         active_cb=lambda: heard.append("active"),
-        feedback_cb=lambda feedback: heard.append(feedback.now),
+        feedback_cb=take,
     )
     print(client.wait_for_result(rospy.Duration(60)), client.get_state(), client.get_result().sum,
           client.get_goal_status_text(), client.simple_state)
@@ -110,7 +115,11 @@ def test_a_newer_goal_preempts(network: Network, path: str) -> None:
     )
     first.wait_for("active")
     second = network.program(
-        CLIENT + "    print(client.send_goal_and_wait(CountGoal(3)), client.get_result().sum)\n",
+        CLIENT
+        + """
+    rospy.set_param("/taken", 3)
+    print(client.send_goal_and_wait(CountGoal(3)), client.get_result().sum)
+""",
         "__name:=second",
         ROSZ_PACKAGE_PATH=path,
     )

@@ -112,10 +112,14 @@ class Listener(roslaunch.pmon.ProcessListener):
         died.set()
 
 parent = roslaunch.parent.ROSLaunchParent(
-    uuid, [(sys.argv[1], ["name:=bob"])], process_listeners=[Listener()], show_summary=False
+    uuid,
+    [(sys.argv[1], ["name:=bob", "go:=" + sys.argv[2]])],
+    process_listeners=[Listener()],
+    show_summary=False,
 )
 parent.start()
 say("names", parent.pm.get_active_names())
+open(sys.argv[2], "w").close()
 died.wait(60)
 script = roslaunch.scriptapi.ROSLaunch()
 script.start()
@@ -137,8 +141,10 @@ say("active", parent.pm.get_active_names())
 """
 LAUNCH = """<launch>
   <arg name="name"/><param name="who" value="$(arg name)"/>
+  <arg name="go" default="/" doc="What has to exist before the second node begins, and fails"/>
+  <arg name="prefix" value="until [ -e $(arg go) ]; do sleep 0.05; done; exec $0 $@"/>
   <node pkg="rosz_tutorials" type="subscriber.py" name="$(arg name)"/>
-  <node pkg="topic_tools" type="relay" name="wrong"/>
+  <node pkg="topic_tools" type="relay" name="wrong" launch-prefix="sh -c '$(arg prefix)'"/>
 </launch>"""
 
 
@@ -146,7 +152,8 @@ def test_a_script_starts_and_ends_launches(network: Network, tmp_path: Path) -> 
     script, launch = tmp_path / "script.py", tmp_path / "a.launch"
     script.write_text(SCRIPT)
     launch.write_text(LAUNCH)
-    program = network.run("-m", "rosz.ros1", str(script), str(launch), PYTHONWARNINGS="")
+    words = map(str, (script, launch, tmp_path / "go"))
+    program = network.run("-m", "rosz.ros1", *words, PYTHONWARNINGS="")
     assert program.exit_code() == 0, program.output
     said = ("names", "died", "alive", "refused", "who", "active")
     assert [line for line in program.lines if line.startswith(said)] == [

@@ -7,7 +7,7 @@ from .rospy_programs import Printed
 
 def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
     assert printed("""
-        import threading
+        import threading, time
         import rospy
         from std_msgs.msg import String
         rospy.init_node("shared")
@@ -36,6 +36,8 @@ def test_the_shared_publisher_has_rospys_names(printed: Printed) -> None:
         print(came.wait(60))
         links[0](String("welcome"))
         print(heard.wait(60), got)
+        while not impl.get_num_connections():
+            time.sleep(0.002)
         print(out.impl.has_connections(), out.impl.has_connection("/shared"),
               impl.get_num_connections(), listener in out.impl.subscriber_listeners)
         impl.remove_callback(take, ["extra"])

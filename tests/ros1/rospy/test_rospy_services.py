@@ -25,70 +25,67 @@ def printed(network: Network) -> Printed:
     return lambda script: run(network, BEGIN + script)
 
 
-@pytest.mark.parametrize(
-    ("kind", "handler", "shown"),
-    [
-        ("AddTwoInts", "lambda r: AddTwoIntsResponse(r.a + r.b)", "sum=7"),
-        ("AddTwoInts", "lambda r: r.a + r.b", "sum=7"),
-        ("AddTwoInts", "lambda r: [r.a]", "sum=3"),
-        ("AddTwoInts", "lambda r: (r.b,)", "sum=4"),
-        ("AddTwoInts", "lambda r: {'sum': 1}", "sum=1"),
-        ("AddTwoInts", "lambda r: []", "sum=0"),
-        ("SetBool", "lambda r: (r.data, 'm')", "success=True, message='m'"),
-        ("SetBool", "lambda r: {'success': True}", "success=True, message=''"),
-        ("Empty", "lambda r: []", "EmptyResponse()"),
-    ],
-)
-def test_valid_results_of_handlers(network: Network, kind: str, handler: str, shown: str) -> None:
-    arguments = {"AddTwoInts": "3, 4", "SetBool": "True", "Empty": ""}[kind]
-    (line,) = run(
-        network,
-        f"""{BEGIN}
-    rospy.Service("s", {kind}, {handler})
-    show("call", lambda: rospy.ServiceProxy("s", {kind})({arguments}))
-""",
-    )
-    assert shown in line
-
-
-@pytest.mark.parametrize(
-    ("kind", "handler", "shown"),
-    [
-        ("AddTwoInts", "lambda r: None", "service handler returned None"),
-        ("Empty", "lambda r: None", "service handler returned None"),
-        (
-            "AddTwoInts",
-            "lambda r: [1, 2]",
-            "handler returned wrong number of values: Invalid number of arguments,"
-            " args should be ['sum'] args are(1, 2)",
-        ),
-        (
-            "AddTwoInts",
-            "lambda r: {'x': 1}",
-            "handler returned invalid value: x is not an attribute of AddTwoIntsResponse",
-        ),
-        (
-            "SetBool",
-            "lambda r: True",
-            "handler returned invalid value: Invalid number of arguments,"
-            " args should be ['success', 'message'] args are(True,)",
-        ),
-        ("AddTwoInts", "refuse", "mine"),
-    ],
-)
-def test_invalid_results_of_handlers(network: Network, kind: str, handler: str, shown: str) -> None:
-    lines = run(
-        network,
-        f"""{BEGIN}
+VALID = [
+    ("AddTwoInts", "lambda r: AddTwoIntsResponse(r.a + r.b)", "sum=7"),
+    ("AddTwoInts", "lambda r: r.a + r.b", "sum=7"),
+    ("AddTwoInts", "lambda r: [r.a]", "sum=3"),
+    ("AddTwoInts", "lambda r: (r.b,)", "sum=4"),
+    ("AddTwoInts", "lambda r: {'sum': 1}", "sum=1"),
+    ("AddTwoInts", "lambda r: []", "sum=0"),
+    ("SetBool", "lambda r: (r.data, 'm')", "success=True, message='m'"),
+    ("SetBool", "lambda r: {'success': True}", "success=True, message=''"),
+    ("Empty", "lambda r: []", "EmptyResponse()"),
+]
+INVALID = [
+    ("AddTwoInts", "lambda r: None", "service handler returned None"),
+    ("Empty", "lambda r: None", "service handler returned None"),
+    (
+        "AddTwoInts",
+        "lambda r: [1, 2]",
+        "handler returned wrong number of values: Invalid number of arguments,"
+        " args should be ['sum'] args are(1, 2)",
+    ),
+    (
+        "AddTwoInts",
+        "lambda r: {'x': 1}",
+        "handler returned invalid value: x is not an attribute of AddTwoIntsResponse",
+    ),
+    (
+        "SetBool",
+        "lambda r: True",
+        "handler returned invalid value: Invalid number of arguments,"
+        " args should be ['success', 'message'] args are(True,)",
+    ),
+    ("AddTwoInts", "refuse", "mine"),
+]
+CALL = """
     def refuse(request):
         raise rospy.ServiceException("mine")
-    rospy.Service("s", {kind}, {handler})
-    proxy = rospy.ServiceProxy("s", {kind})
-    show("call", lambda: proxy(*[0] * len(proxy.request_class.__slots__)))
-""",
-    )
-    text = f"service cannot process request: {shown}"
-    assert lines == [f"call -> {ERROR}{text.encode()!r}"]
+    VALUES = {"AddTwoInts": (3, 4), "SetBool": (True,), "Empty": ()}
+    def call(number, kind, handler):
+        rospy.Service(f"s{number}", kind, handler)
+        proxy = rospy.ServiceProxy(f"s{number}", kind)
+        show("call", lambda: proxy(*VALUES[kind.__name__]))
+"""
+
+
+def outcomes(network: Network, handlers: list[tuple[str, str, str]]) -> list[str]:
+    """Return what calls of services with some handlers show, each on a line."""
+    calls = (f"call({n}, {kind}, {code})" for n, (kind, code, _) in enumerate(handlers))
+    return run(network, BEGIN + CALL + "\n".join(f"    {call}" for call in calls))
+
+
+def test_valid_results_of_handlers(network: Network) -> None:
+    for line, (_, handler, shown) in zip(outcomes(network, VALID), VALID, strict=True):
+        assert shown in line, handler
+
+
+def test_invalid_results_of_handlers(network: Network) -> None:
+    texts = [f"service cannot process request: {shown}".encode() for _, _, shown in INVALID]
+    assert outcomes(network, INVALID) == [
+        f"call -> {ERROR.replace('[/s]', f'[/s{number}]')}{text!r}"
+        for number, text in enumerate(texts)
+    ]
 
 
 def test_handler_errors_are_logged_and_sent_to_the_caller(printed: Printed) -> None:

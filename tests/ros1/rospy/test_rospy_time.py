@@ -206,16 +206,15 @@ def test_simulated_time(network: Network, printed: Printed) -> None:
     node.params.set("/use_sim_time", True)
     lines = printed("""
         import threading, rospy
+        from itertools import count, repeat
         from rosgraph_msgs.msg import Clock
         rospy.init_node("simulated")
         ticks = rospy.Publisher("/clock", Clock, queue_size=1)
         print(rospy.rostime.is_wallclock(), rospy.get_time())
-        seconds = [10.0]
-        step = [0.25]
+        times = [count(10.0, 0.25)]
         def tick():
             while not rospy.is_shutdown():
-                ticks.publish(rospy.Time.from_sec(seconds[0]))
-                seconds[0] += step[0]
+                ticks.publish(rospy.Time.from_sec(next(times[0])))
                 pause.wait(0.01)
         pause = threading.Event()
         threading.Thread(target=tick, daemon=True).start()
@@ -230,7 +229,7 @@ def test_simulated_time(network: Network, printed: Printed) -> None:
         rospy.Timer(rospy.Duration(2), lambda event: again.set(), oneshot=True)
         print(again.wait(60))
         def back():
-            seconds[0], step[0] = 1.0, 0.0
+            times[0] = repeat(1.0)
         threading.Timer(1, back).start()
         show("back", lambda: rospy.sleep(1e6))
         print(rospy.get_time())

@@ -123,6 +123,7 @@ def test_subscribers_of_a_topic_share_a_thread(printed: Printed) -> None:
     a = rospy.Subscriber("x", String, first)
     b = rospy.Subscriber("x", String, second, callback_args="!")
     until(out.get_num_connections)
+    until(a.get_num_connections)
     for i in range(3):
         out.publish(str(i))
     until(lambda: len(calls) == 6)
@@ -250,8 +251,10 @@ def test_the_header_of_a_message_waits_for_the_token_of_its_publisher(printed: P
     (line,) = printed("""
     import threading, time
     from rosz.qos import QoS
+    from rosz.ros1.client.rospy import shared
     from rosz.ros1.state import context
     from rosz.wire import Kind, Token, entity_key, format_token, gid, pack_attachment
+    shared._ORIGIN_TIMEOUT = 60  # a busy machine may take longer to start a thread
     session = context().session
     kind = "std_msgs/msg/String", String._type_hash
     domain = context().domain

@@ -12,7 +12,7 @@ from rosz.msgs.std_msgs.msg import String
 from rosz.msgs.std_srvs.srv import Empty
 from rosz.node import Node
 
-_RATE = {"topic": "chatter", "test_duration": 0.3, "wait_time": 30.0}
+_RATE = {"topic": "chatter", "test_duration": 1.0, "wait_time": 30.0}
 
 
 @pytest.fixture

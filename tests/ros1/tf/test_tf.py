@@ -152,7 +152,7 @@ def test_buffers_of_other_nodes(network: Network) -> None:
         rospy.init_node("client")
         rospy.wait_for_service("/server/tf2_frames", 60)
         print(rospy.ServiceProxy("/server/tf2_frames", FrameGraph)().frame_yaml.splitlines()[:2])
-        buffer = tf2_ros.BufferClient("lookups")
+        buffer = tf2_ros.BufferClient("lookups", timeout_padding=rospy.Duration(60))
         print(buffer.wait_for_server(rospy.Duration(60)))
         none = rospy.Duration(0)
         print(buffer.lookup_transform("base", "laser", rospy.Time(0)).transform.translation.x)

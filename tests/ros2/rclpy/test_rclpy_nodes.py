@@ -11,6 +11,7 @@ import pytest
 from network import TIMEOUT, Network, eventually
 
 from rosz.errors import ClosedError, ServiceError
+from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.msgs.rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -18,6 +19,7 @@ from rosz.msgs.rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rosz.msgs.rcl_interfaces.srv import SetParameters
+from rosz.msgs.rosgraph_msgs.msg import Clock as ClockMessage
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.msgs.std_srvs.srv import SetBool
 from rosz.ros2.rclpy import exceptions, executors
@@ -30,7 +32,7 @@ from rosz.ros2.rclpy.executors import (
 from rosz.ros2.rclpy.node import Node
 from rosz.ros2.rclpy.parameter import Parameter
 from rosz.ros2.rclpy.qos import DurabilityPolicy, QoSProfile
-from rosz.ros2.rclpy.time import ClockType, Duration
+from rosz.ros2.rclpy.time import ClockChange, ClockType, Duration, JumpThreshold, TimeJump
 
 from .conftest import Start, World
 
@@ -447,3 +449,74 @@ def test_asyncio_awaits_futures(world: World) -> None:
         return results
 
     assert asyncio.run(asyncio.wait_for(main(), TIMEOUT)) == ["done", "inner"]
+
+
+def test_simulated_time_begins_and_ends_while_the_node_runs(world: World, network: Network) -> None:
+    """Jump callbacks are told of it, and of jumps that are large enough."""
+    node, told = world.node, list[object]()
+    ticks: list[bool] = []
+    node.create_timer(0.01, lambda: ticks.append(node.get_clock().ros_time_is_active))
+    threshold = JumpThreshold(
+        min_forward=Duration(seconds=60), min_backward=Duration(nanoseconds=-1)
+    )
+    handle = node.get_clock().create_jump_callback(
+        threshold,
+        pre_callback=lambda: told.append(node.get_clock().ros_time_is_active),
+        post_callback=told.append,
+    )
+    other = network.node("other")
+    other.params["/robot/use_sim_time"] = True
+    world.spin_until(lambda: node.get_clock().ros_time_is_active, "simulated time")
+    assert node.get_parameter("use_sim_time").value is True
+    clock = other.publisher("/clock", ClockMessage)
+    clock.wait_for_subscribers()
+    seconds = 0.0
+
+    def ticked() -> bool:
+        nonlocal seconds
+        seconds += 0.01
+        clock.publish(ClockMessage(TimeMessage(*divmod(round(seconds * 1e9), 10**9))))
+        return node.get_clock().now().nanoseconds > 0 and True in ticks
+
+    ticks.clear()
+    world.spin_until(ticked, "a tick of simulated time")
+    for moment, count in ((1000, 4), (2, 6)):
+        clock.publish(ClockMessage(TimeMessage(moment)))
+        world.spin_until(lambda count=count: len(told) == count, "a jump")  # type: ignore[misc]
+    ticks.clear()
+    node.set_parameters([Parameter("use_sim_time", value=False)])
+    world.spin_until(lambda: False in ticks, "a tick of wall time")
+    assert told[::2] == [False, True, True, True]
+    jumps = [jump for jump in told if isinstance(jump, TimeJump)]
+    change = ClockChange.ROS_TIME_NO_CHANGE
+    assert [jump.clock_change for jump in jumps] == [
+        ClockChange.ROS_TIME_ACTIVATED,
+        change,
+        change,
+        ClockChange.ROS_TIME_DEACTIVATED,
+    ]
+    assert jumps[2].delta == Duration(seconds=-998)
+    handle.unregister()
+    node.set_parameters([Parameter("use_sim_time", value=True)])
+    assert len(told) == 8
+
+
+def test_jumps_that_cannot_be(world: World) -> None:
+    with pytest.raises(ValueError, match="min_forward must be"):
+        JumpThreshold(min_forward=Duration(), min_backward=None)
+    with pytest.raises(ValueError, match="min_backward must be"):
+        JumpThreshold(min_forward=None, min_backward=Duration(seconds=1))
+    threshold = JumpThreshold(min_forward=None, min_backward=None)
+    with pytest.raises(ValueError, match="must be callable"):
+        world.node.get_clock().create_jump_callback(threshold)
+
+
+def test_shutdown_ends_all_that_spin(start: Start, network: Network) -> None:
+    executor = executors.SingleThreadedExecutor(context=start())
+    threads = [network.thread(executor.spin_once) for _ in range(3)]
+    eventually(lambda: len(executor._wakeups) == len(threads))
+    executor.shutdown()
+    for thread in threads:
+        thread.join(TIMEOUT)
+        assert not thread.is_alive()
+    assert executor._wakeups == []

@@ -5,7 +5,9 @@
 - `store`: the writes, and which ones are taken; `disk`: what of them is stored;
 - `members`: the other replicas, visible and absent; `seeds`: who follows all of them;
 - `deliveries`: the batches of this replica, which others acknowledge;
-- `comparisons`: the exchange of differences; `joining`: how a replica gets all at its beginning.
+- `comparisons`: the exchange of differences;
+- `joining`: how a replica gets all at its beginning; `ending`: how it hands over what only it has;
+- `calls`: calls that wait for the other replicas; `upkeep`: the periodic work.
 
 `work` is what they share during a step, and `replica_core` hands each event to its part.
 """

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 from rosz.errors import DecodeError
 from rosz.params.history import EMPTY_DIGEST, Differences
 from rosz.params.paths import Path, common_path, joined
+from rosz.params.replica.core.deliveries import Deliveries
 from rosz.params.replica.core.effects import Reply, SendQuery
 from rosz.params.replica.core.events import QueryEnded, SyncReceived, WritesReceived
 from rosz.params.replica.core.members import Members
@@ -37,6 +38,9 @@ _SPREAD: Final = 0.05
 
 _MAX_COMPARED: Final = 8
 """Replicas to compare with, of those that appear together; with more, a large start never ends."""
+
+_MAX_INDEXES: Final = 3
+"""Indexes that a comparison sends: while it lasts, a write may replace others in other buckets."""
 
 _RETRY_REFUSED_AFTER: Final = 3600.0
 """Seconds before a refused write is sent again: the rules on the way may have changed."""
@@ -71,7 +75,7 @@ class _Comparison:
         self.newest = newest
         self.waiters = waiters
         self.joined = False
-        self.has_digest = False
+        self.indexes = 0
         self.parts: list[list[Write]] = []
         self.sent: list[Write] = []
 
@@ -80,26 +84,27 @@ class Comparisons:
     """All exchanges of differences with other replicas.
 
     Args:
-        work: The step.
+        work: Gives the time of the step, and collects its effects.
         store: The writes of this replica.
         members: The other replicas.
+        deliveries: The own batches.
 
     Attributes:
         ready: Whether this replica has joined.
         ended: Comparisons that ended in this step.
     """
 
-    def __init__(self, work: Work, store: Store, members: Members) -> None:
+    def __init__(self, work: Work, store: Store, members: Members, deliveries: Deliveries) -> None:
         self.ready: bool = False
         self.ended: list[Compared] = []
         self._work = work
         self._store = store
         self._members = members
+        self._deliveries = deliveries
         self._open: dict[str, _Comparison] = {}
         self._queries: dict[int, _Comparison] = {}
         self._again: dict[str, list[int]] = {}
         self._appeared: set[str] = set()
-        self._newest = 0
         self._refused: dict[_Sent, float] = {}
         self._unreported: dict[str, list[Path]] = {}
 
@@ -108,21 +113,20 @@ class Comparisons:
         """Whether any is under way."""
         return bool(self._open)
 
-    def start(self, zid: str, newest: int, waiter: int = 0, *, appoints: bool = False) -> None:
+    def start(self, zid: str, waiter: int = 0, *, appoints: bool = False) -> None:
         """Compare with a replica, after the comparison that is under way if there is one.
 
         Args:
             zid: Its session.
-            newest: Number of the newest own batch.
             waiter: Number of the call that waits for it.
             appoints: Whether the other one has to become a seed.
         """
-        self._newest = newest
         waiters = [waiter] if waiter else []
         if zid in self._open:
             if waiter:
                 self._again.setdefault(zid, []).append(waiter)
             return
+        newest = self._deliveries.newest
         comparison = self._open[zid] = _Comparison(zid, newest, waiters)
         request = self._compose(digest=self._store.history.digest())
         request.appoints = appoints
@@ -138,18 +142,18 @@ class Comparisons:
             self._work.later(self._work.random.uniform(0, _SPREAD), APPEARED)
         self._appeared.add(zid)
 
-    def start_with_appeared(self, newest: int) -> None:
-        """Compare with those that have appeared."""
+    def start_with_appeared(self, _: int = 0) -> None:
+        """Compare with those that have appeared; called by a timer."""
         zids, self._appeared = sorted(self._appeared), set()
         for zid in self._work.random.sample(zids, min(len(zids), _MAX_COMPARED)):
-            self.start(zid, newest)
+            self.start(zid)
 
-    def start_with_one(self, newest: int) -> None:
+    def start_with_one(self) -> None:
         """Compare with a random seed, or with any replica if there is none."""
         self._trim_refused()
         zids = [member.zid for member in self._members.seeds()] or sorted(self._members.zids)
         if zids:
-            self.start(self._work.random.choice(zids), newest)
+            self.start(self._work.random.choice(zids))
 
     def on_ended(self, event: QueryEnded) -> None:
         """Handle the end of a query."""
@@ -165,7 +169,8 @@ class Comparisons:
                 self._on_reply(comparison, event.reply)
         except DecodeError as error:
             label = self._members.label(comparison.zid)
-            self._store.report(f"the replica in {label} sent a damaged reply", error)
+            text = f"the replica in {label} sent a damaged reply (reported once): {error!s:.300}"
+            self._work.log(logging.WARNING, text, once="damaged reply")
             self._end(comparison, good=False)
 
     def on_sync(self, event: SyncReceived) -> None:
@@ -206,7 +211,7 @@ class Comparisons:
         writes = history.writes() if whole else differences.lacking
         behind = request.horizon > history.horizon or differences.behind
         if behind and request.sender in self._members.zids:
-            self.start(request.sender, self._newest)
+            self.start(request.sender)
         reply = SyncReply(history.digest(), self.ready, whole=ahead, horizon=history.horizon)
         reply.records = [Record.of(write) for write in writes]
         reply.wanted = [join_path(path) for path in differences.wanted]
@@ -221,23 +226,22 @@ class Comparisons:
             self._store.merge(writes, reply.horizon)
         else:
             self._store.add(writes)
+        if not comparison.indexes:
+            comparison.joined = reply.ready
         history = self._store.history
-        if not comparison.has_digest:
-            comparison.has_digest, comparison.joined = True, reply.ready
-            buckets = history.differing(reply.digest)
-            if buckets:
-                ours = [write for bucket in buckets for write in history.bucket(bucket)]
-                self._query(comparison, self._compose(index=Index.of(buckets, ours)))
-            else:
-                self._end(comparison, good=True)
-            return
         candidates = [history.find(split_path(path)) for path in reply.wanted]
         wanted = [
             write for write in candidates if write and not self._is_refused(comparison, write)
         ]
         if wanted:
             comparison.parts.append(wanted)
-        self._send_next(comparison)
+        buckets = [] if reply.wanted else history.differing(reply.digest)
+        if buckets and comparison.indexes < _MAX_INDEXES:
+            comparison.indexes += 1
+            index = Index.of(buckets, history.in_buckets(buckets))
+            self._query(comparison, self._compose(index=index))
+        else:
+            self._send_next(comparison)
 
     def _send_next(self, comparison: _Comparison) -> None:
         if comparison.parts:
@@ -277,7 +281,7 @@ class Comparisons:
             self.ended.append(Compared(zid, waiter, good, comparison.joined, shared))
         waiters = self._again.pop(zid, [])
         if waiters:
-            self.start(zid, self._newest)
+            self.start(zid)
             self._open[zid].waiters += waiters
 
     def _is_refused(self, comparison: _Comparison, write: Write) -> bool:

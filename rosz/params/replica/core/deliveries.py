@@ -2,10 +2,11 @@
 
 A batch is delivered when every replica that it waits for has acknowledged it, and the own disk has
 it. It waits for all that are visible and for the absent ones that `Members.awaited` names. One that
-has not acknowledged it after a moment is sent it once more, as a query to it alone. One that still
-does not answer in time is lagging: no batch waits for it until it answers again, but each names it.
-One that refuses the batch, or cannot store it, acknowledges it with the reason. Whatever becomes of
-it, a batch is never undone: others may have acknowledged writes that build on it.
+has not acknowledged it after a moment, and has not reported that it works on it, gets it once more,
+as a query to it alone. One that still does not answer in time is lagging: no batch waits for it
+until it answers again, but each names it. One that refuses the batch, or cannot store it,
+acknowledges it with the reason. Whatever becomes of it, a batch is never undone: others may have
+acknowledged writes that build on it.
 """
 
 from __future__ import annotations
@@ -17,14 +18,16 @@ from typing import Final
 
 from rosz.errors import ParamError, PartlyWritten
 from rosz.params.paths import Path, joined
-from rosz.params.replica.core.effects import Answer, FindStopped, Outcome, Publish, Resend
-from rosz.params.replica.core.events import Acknowledged, WriteCalled
+from rosz.params.replica.core.effects import Answer, FindStoppedPeers, Outcome, Publish, Resend
+from rosz.params.replica.core.events import Acknowledged, Progressed, WriteCalled
 from rosz.params.replica.core.members import Members
 from rosz.params.replica.core.work import Work
 from rosz.params.wire import Batch
 
 DELIVERY: Final = "delivery"
 _RESEND_AFTER: Final = 0.25
+_ROUNDING: Final = 1e-6
+"""Seconds that a timer may fire early by rounding; one for what is left would fire at once."""
 _MAX_UNSHARED: Final = 10_000
 """Own batches that are remembered because nobody else is known to have them."""
 
@@ -43,7 +46,9 @@ class _OpenBatch:
         self.batch = batch
         self.paths = [path for path, _ in call.changes]
         self.began = now
-        self.deadline = now + call.timeout
+        self.by_progress = call.by_progress
+        self.timeout = call.timeout
+        self.progressed = now
         self.waiting: set[str] = set()
         self.skipped: set[str] = set()
         self.holders: set[str] = set()
@@ -54,6 +59,15 @@ class _OpenBatch:
         self.resent: set[str] = set()
 
     @property
+    def name(self) -> str:
+        more = f" and {len(self.paths) - 1} more" if len(self.paths) > 1 else ""
+        return f"'{joined(self.paths[0])}'{more}"
+
+    @property
+    def deadline(self) -> float:
+        return (self.progressed if self.by_progress else self.began) + self.timeout
+
+    @property
     def done(self) -> bool:
         return not (self.waiting or self.finding or self.storing)
 
@@ -62,20 +76,21 @@ class Deliveries:
     """All batches of a replica that are not yet delivered.
 
     Args:
-        work: The step.
+        work: Gives the time of the step, and collects its effects.
         members: The other replicas.
 
     Attributes:
         newest: Number of the newest batch.
+        stopped: Sessions of replicas on this machine whose processes are stopped.
     """
 
     def __init__(self, work: Work, members: Members) -> None:
         self.newest: int = 0
+        self.stopped: frozenset[str] = frozenset()
         self._work = work
         self._members = members
         self._open: dict[int, _OpenBatch] = {}
         self._lagging: set[str] = set()
-        self._stopped: frozenset[str] = frozenset()
         self._unshared: dict[int, list[Path]] = {}
         self._told_alone = False
 
@@ -92,23 +107,21 @@ class Deliveries:
         self._open[self.newest] = delivery
         return self.newest
 
-    def await_all(self, number: int, *, finding: bool, storing: bool, reason: str) -> None:
+    def await_all(self, number: int, all_known: bool, reason: str | None) -> None:
         """Begin to wait for a batch that was sent.
 
         Args:
             number: Number of the batch.
-            finding: Whether not all others are known yet.
-            storing: Whether the own disk does not have it yet.
-            reason: Why the own disk cannot store it.
+            all_known: Whether all others are known.
+            reason: What `Disk.wait` returns for it.
         """
         delivery = self._open[number]
-        delivery.finding, delivery.storing = finding, storing
+        delivery.finding, delivery.storing = not all_known, reason is None
         if reason:
             delivery.reasons[self._work.zid] = reason
         self._expect(delivery, self._members.zids | self._members.awaited())
-        timeout = delivery.deadline - self._work.now.seconds
         if not self._end_if_done(delivery):
-            self._work.later(min(_RESEND_AFTER, timeout), DELIVERY, number, delivery.call)
+            self._work.later(min(_RESEND_AFTER, delivery.timeout), DELIVERY, number, delivery.call)
 
     def await_nobody(self, number: int) -> None:
         """Return from a call that does not wait."""
@@ -122,16 +135,17 @@ class Deliveries:
                 delivery.finding = False
                 self._expect(delivery, self._members.zids | self._members.awaited())
                 if not self._end_if_done(delivery) and delivery.is_late:
-                    self._work.do(FindStopped())
+                    self._work.do(FindStoppedPeers())
 
     def acknowledge(self, event: Acknowledged) -> bool:
         """Handle an acknowledgement; return whether it is the first of a replica that lagged."""
         returned = event.zid in self._lagging
-        self._lagging.discard(event.zid)
-        self._stopped -= {event.zid}
+        if event.zid in self.stopped:
+            self.stopped -= {event.zid}
         if not event.reason:
             self._unshared.pop(event.number, None)
         if returned:
+            self._lagging.discard(event.zid)
             self._await_returned(event.zid, event.number)
         delivery = self._open.get(event.number)
         if delivery is not None:
@@ -142,8 +156,25 @@ class Deliveries:
                 delivery.reasons.pop(event.zid, None)
             delivery.waiting.discard(event.zid)
             delivery.skipped.discard(event.zid)
+            if delivery.by_progress:
+                delivery.progressed = self._work.now.seconds
             self._end_if_done(delivery)
         return returned
+
+    def on_progress(self, event: Progressed) -> None:
+        """Handle progress of a batch; a replica that works on it does not get it once more."""
+        delivery = self._open.get(event.number)
+        if delivery is not None:
+            delivery.progressed = self._work.now.seconds
+            if event.zid:
+                delivery.resent.add(event.zid)
+
+    def progress(self, stamp: tuple[int, str]) -> tuple[int, list[str]]:
+        """Return the number of replicas that have a batch, and the labels of those it waits for."""
+        for delivery in list(self._open.values()):
+            if (delivery.batch.time, delivery.batch.clock) == stamp:
+                return len(delivery.holders), self._labels(delivery.waiting.copy())
+        return 0, []
 
     def on_stored(self, number: int, reason: str) -> None:
         """Handle that the own disk has a batch, or cannot store it."""
@@ -154,17 +185,17 @@ class Deliveries:
                 delivery.reasons[self._work.zid] = reason
             self._end_if_done(delivery)
 
-    def add(self, zid: str, before: str) -> None:
+    def add(self, zid: str, before: list[str]) -> None:
         """Wait for a replica that appears, which may have missed what is under way.
 
         Args:
             zid: Its session.
-            before: Session under which it was absent; empty if it was not.
+            before: Sessions under which it was absent.
         """
-        self._lagging.discard(before)
+        self._lagging.difference_update(before)
         self._told_alone = False
         for delivery in self._open.values():
-            delivery.waiting.discard(before)
+            delivery.waiting.difference_update(before)
             if not delivery.finding and zid not in delivery.holders:
                 delivery.waiting.add(zid)
                 self._resend(delivery, [zid])
@@ -175,7 +206,7 @@ class Deliveries:
             if not delivery.finding:
                 self._expect(delivery, self._members.awaited())
                 if delivery.is_late and delivery.waiting - delivery.resent:
-                    self._work.do(FindStopped())
+                    self._work.do(FindStoppedPeers())
 
     def drop(self, zids: Iterable[str]) -> None:
         """Stop waiting for replicas that are gone."""
@@ -191,18 +222,24 @@ class Deliveries:
         delivery = self._open.get(number)
         if delivery is None:
             return
-        remaining = delivery.deadline - self._work.now.seconds
-        if remaining <= 0:
+        now = self._work.now.seconds
+        remaining = delivery.deadline - now
+        wait = delivery.progressed + _RESEND_AFTER - now
+        if delivery.by_progress and delivery.storing:
+            remaining = max(remaining, _RESEND_AFTER)
+        if remaining < _ROUNDING:
             self._end(delivery)
-            return
-        self._work.later(remaining, DELIVERY, number, delivery.call)
-        delivery.is_late = True
-        if delivery.waiting:
-            self._work.do(FindStopped())
+        elif wait >= _ROUNDING:
+            self._work.later(min(remaining, wait), DELIVERY, number, delivery.call)
+        else:
+            self._work.later(remaining, DELIVERY, number, delivery.call)
+            delivery.is_late = True
+            if delivery.waiting:
+                self._work.do(FindStoppedPeers())
 
-    def on_stopped(self, zids: frozenset[str]) -> None:
+    def on_peers_stopped(self, zids: frozenset[str]) -> None:
         """Send batches once more to those that are not stopped; the others get them later."""
-        self._stopped = zids
+        self.stopped = zids
         for delivery in self._open.values():
             if delivery.is_late:
                 self._resend(delivery, sorted(delivery.waiting - delivery.resent - zids))
@@ -229,8 +266,10 @@ class Deliveries:
 
     def _expect(self, delivery: _OpenBatch, zids: AbstractSet[str]) -> None:
         expected = zids - delivery.holders - delivery.reasons.keys()
-        delivery.skipped |= expected & self._lagging
-        delivery.waiting |= expected - self._lagging
+        if self._lagging:
+            delivery.skipped |= expected & self._lagging
+            expected -= self._lagging
+        delivery.waiting |= expected
 
     def _await_returned(self, zid: str, number: int) -> None:
         """Wait for a replica that lagged, for all batches but the one that it acknowledges now."""
@@ -255,38 +294,41 @@ class Deliveries:
     def _end(self, delivery: _OpenBatch) -> None:
         """Tell the caller how far a batch got."""
         del self._open[delivery.number]
-        late = self._labels(delivery.waiting)
-        name = joined(delivery.paths[0])
-        more = f" and {len(delivery.paths) - 1} more" if len(delivery.paths) > 1 else ""
-        if delivery.waiting:
-            seconds = self._work.now.seconds - delivery.began
-            self._work.log(
-                logging.WARNING,
-                f"'{name}'{more} is written, but not yet known to {', '.join(late)}, which did not"
-                f" answer within {seconds:.2g} s",
-            )
-        self._lagging |= delivery.waiting
-        known = self._members.zids | self._members.awaited()
-        slow = [*late, *self._labels(delivery.skipped & known)]
-        if delivery.finding:
-            slow.append(_UNFOUND)
-        if delivery.storing:
-            slow.append(f"the file of {self._work.config.member.label}")
+        slow = self._name_slow(delivery) if delivery.skipped or not delivery.done else ()
         holders = len(delivery.holders)
         result: Outcome | ParamError
         if delivery.reasons:
             reasons = {self._label(zid): why for zid, why in delivery.reasons.items()}
-            result = PartlyWritten(f"'{name}'{more}", holders, reasons, tuple(slow))
+            result = PartlyWritten(delivery.name, holders, reasons, slow)
         else:
             alone = not (holders or self._members.zids or delivery.finding)
-            result = Outcome(delivery.batch.time, tuple(slow), holders, alone)
+            result = Outcome(delivery.batch.time, slow, holders, alone)
             if alone and self._members.lost_all and not self._told_alone:
                 self._told_alone = True
-                self._work.log(logging.WARNING, _ALONE % name)
+                self._work.log(logging.WARNING, _ALONE % joined(delivery.paths[0]))
         self._work.do(Answer(delivery.call, result))
 
+    def _name_slow(self, delivery: _OpenBatch) -> tuple[str, ...]:
+        """Return the labels of replicas that are late; no batch waits for them from now on."""
+        late = self._labels(delivery.waiting)
+        if late:
+            seconds = self._work.now.seconds - delivery.began
+            self._work.log(
+                logging.WARNING,
+                f"{delivery.name} is written, but not yet known to {', '.join(late)}, which did not"
+                f" answer within {seconds:.2g} s",
+            )
+        self._lagging |= delivery.waiting
+        known = self._members.zids | self._members.awaited()
+        slow = [*late, *self._labels(delivery.skipped & known - delivery.waiting)]
+        if delivery.finding:
+            slow.append(_UNFOUND)
+        if delivery.storing:
+            slow.append(f"the file of {self._work.config.member.label}")
+        return tuple(slow)
+
     def _labels(self, zids: Iterable[str]) -> list[str]:
-        return sorted(self._label(zid) + " (stopped)" * (zid in self._stopped) for zid in zids)
+        return sorted(self._label(zid) + " (stopped)" * (zid in self.stopped) for zid in zids)
 
     def _label(self, zid: str) -> str:
         own = self._work.config.member

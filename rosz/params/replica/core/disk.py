@@ -24,7 +24,7 @@ class Disk:
     """The file of a replica, if it has one.
 
     Args:
-        work: The step.
+        work: Gives the time of the step, and collects its effects.
 
     Attributes:
         reason: Why writes cannot be stored; empty if they can.

@@ -220,8 +220,8 @@ class Leave(Effect, frozen=True):
     """
 
 
-class FindStopped(Effect, frozen=True):
-    """Find the sessions on this machine whose processes are stopped: `StoppedFound` must follow."""
+class FindStoppedPeers(Effect, frozen=True):
+    """Find the sessions of this machine with stopped processes: `StoppedPeersFound` must follow."""
 
 
 class ReadStorages(Effect, frozen=True):

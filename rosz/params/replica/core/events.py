@@ -77,6 +77,8 @@ class WriteCalled(Event, frozen=True):
         given: Whether the stamp is the caller's own. If not, the core moves it behind all writes
             that it has seen.
         timeout: Time limit in seconds; 0 does not wait for others.
+        by_progress: Whether the time counts from the last sign that the batch gets on, and not
+            while the disk of this process is writing.
     """
 
     call: int
@@ -85,6 +87,7 @@ class WriteCalled(Event, frozen=True):
     stamp: tuple[int, str]
     given: bool = False
     timeout: float = 2.0
+    by_progress: bool = False
 
 
 class FollowCalled(Event, frozen=True):
@@ -146,6 +149,18 @@ class Acknowledged(Event, frozen=True):
     zid: str
     number: int
     reason: str = ""
+
+
+class Progressed(Event, frozen=True):
+    """A batch of this replica is being sent, or another replica is at work on it.
+
+    Attributes:
+        number: Number of the batch.
+        zid: Session of the other replica; empty if the batch is being sent.
+    """
+
+    number: int
+    zid: str = ""
 
 
 class SyncReceived(Event, frozen=True):
@@ -233,8 +248,8 @@ class MemberLeft(Event, frozen=True):
     returns: bool = False
 
 
-class StoppedFound(Event, frozen=True):
-    """The answer to `FindStopped`: the sessions on this machine whose processes are stopped."""
+class StoppedPeersFound(Event, frozen=True):
+    """The answer to `FindStoppedPeers`: the sessions of this machine with stopped processes."""
 
     zids: frozenset[str]
 

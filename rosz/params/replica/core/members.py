@@ -28,6 +28,9 @@ from rosz.params.wire import ReplicaMember
 RECOVERY: Final = 10.0
 """Seconds in which links that were lost are there again, or the other end is gone for good."""
 
+_MAX_EXPIRED: Final = 100
+"""Most absent replicas that are remembered after that; a program may crash repeatedly."""
+
 
 class _Absence(msgspec.Struct, frozen=True):
     member: ReplicaMember
@@ -39,11 +42,11 @@ class Movement(NamedTuple):
     """A change of the set of visible replicas.
 
     Attributes:
-        came: Those that appeared, and the sessions under which they were absent; empty if not.
+        came: Those that appeared, and the sessions under which each of them was absent.
         gone: Sessions of those that disappeared.
     """
 
-    came: list[tuple[ReplicaMember, str]]
+    came: list[tuple[ReplicaMember, list[str]]]
     gone: list[str]
 
 
@@ -51,18 +54,16 @@ class Members:
     """Other replicas of a domain: the seeds, and all of them as long as somebody needs them.
 
     Args:
-        work: The step.
+        work: Gives the time of the step, and collects its effects.
 
     Attributes:
         zids: Sessions of those that are visible; the set is replaced, never changed in place.
         complete: Whether all are followed, and those that existed have been reported.
-        lost_all: Whether all others disappeared, one of them at least without saying so.
     """
 
     def __init__(self, work: Work) -> None:
         self.zids: frozenset[str] = frozenset()
         self.complete: bool = False
-        self.lost_all: bool = False
         self._work = work
         self._seeds: dict[str, ReplicaMember] = {}
         self._all: dict[str, ReplicaMember] = {}
@@ -72,6 +73,11 @@ class Members:
         self._reasons: set[str] = set()
         self._watch = 0
         self._recovers_until = float("-inf")
+
+    @property
+    def lost_all(self) -> bool:
+        """Whether nobody is visible, and some disappeared without saying that they leave."""
+        return bool(self._absent) and not self._visible
 
     def follow(self, reason: str) -> bool:
         """Follow all replicas, until `unfollow` for each reason; return whether all are known."""
@@ -123,7 +129,6 @@ class Members:
             self._absent[zid] = msgspec.structs.replace(absence, returns=True)
         else:
             del self._absent[zid]
-            self._forget_loss()
         return not returns
 
     def recover(self) -> None:
@@ -147,10 +152,10 @@ class Members:
         }
 
     def expire(self) -> list[str]:
-        """Forget those that have been absent for long; return their sessions."""
+        """Return the sessions of those that are not waited for any more."""
         now = self._work.now.seconds
         expired = [zid for zid, absence in self._absent.items() if now >= absence.until]
-        for zid in expired:
+        for zid in expired[:-_MAX_EXPIRED]:
             del self._absent[zid]
         return expired
 
@@ -192,10 +197,6 @@ class Members:
             for zid, member in self._visible.items()
             if zid not in before
         ]
-        if self._visible:
-            self.lost_all = False
-        elif gone:
-            self.lost_all = bool(self._absent)
         return Movement(came, gone)
 
     def _lose(self, member: ReplicaMember) -> None:
@@ -204,16 +205,12 @@ class Members:
             until = self._work.now.seconds + RECOVERY
             self._absent[member.zid] = _Absence(member, until, bool(returns))
 
-    def _find_again(self, member: ReplicaMember) -> str:
-        """Return the session under which a replica that appears was absent; empty if none."""
+    def _find_again(self, member: ReplicaMember) -> list[str]:
+        """Return the sessions under which a replica that appears was absent."""
         self._left.pop(member.zid, None)
-        for zid, absence in self._absent.items():
-            # A program that restarts has another session, and the same label.
-            if zid == member.zid or absence.member.label == member.label:
-                del self._absent[zid]
-                return zid
-        return ""
-
-    def _forget_loss(self) -> None:
-        if not self._absent:
-            self.lost_all = False
+        # A program that restarts has another session, and the same label.
+        labels = {zid: absence.member.label for zid, absence in self._absent.items()}
+        before = [zid for zid in labels if zid == member.zid or labels[zid] == member.label]
+        for zid in before:
+            del self._absent[zid]
+        return before

@@ -24,7 +24,7 @@ class Seeding:
     """Whether this replica is a seed, and who else has to be.
 
     Args:
-        work: The step.
+        work: Gives the time of the step, and collects its effects.
         members: The other replicas.
 
     Attributes:

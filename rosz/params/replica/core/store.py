@@ -1,4 +1,4 @@
-"""The writes of a replica: what is taken, and what is refused."""
+"""The writes of a replica: which are applied, and which are refused."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _STORED_AHEAD: Final = "a stored write counts as written just now"
 
 
 class Store:
-    """The history of a replica; each new write of it goes to the disk and changes the tree.
+    """The history of a replica; it saves each new write, and reports the tree that results.
 
     Args:
-        work: The step.
+        work: Gives the time of the step, and collects its effects.
 
     Attributes:
         history: The history.
@@ -82,7 +82,7 @@ class Store:
         self._apply(self._sort_out(writes, _REFUSED)[0])
 
     def merge(self, writes: Iterable[Write], horizon: int) -> None:
-        """Become one with another replica, of which all writes and the horizon are given.
+        """Merge all writes of another replica, and the horizon below which it forgot deletions.
 
         Raises:
             DecodeError: The horizon lies years ahead; nothing is changed then.
@@ -96,9 +96,9 @@ class Store:
         if lost:
             self._work.log(
                 logging.WARNING,
-                f"'{joined(lost[0].path)}' and {len(lost) - 1} more parameters are dropped: they"
-                " were set while this replica was away for more deletions than others remember, or"
-                " deleted since",
+                f"'{joined(lost[0].path)}' and {len(lost) - 1} more parameters are dropped: while"
+                " this replica was away, others deleted them, or made more deletions than they"
+                " remember",
             )
 
     def load(self, event: Loaded) -> None:
@@ -113,6 +113,10 @@ class Store:
         self._show(old, list(self.history.writes()), own=False)
         if ahead or event.changed:
             self.disk.compact(self.history)
+
+    def on_retry(self, _: int = 0) -> None:
+        """Try again to save what could not be saved; called by a timer, or at the end."""
+        self.disk.on_retry(self.history)
 
     def forget(self) -> None:
         """Drop the oldest deletions if there are far too many."""
@@ -138,7 +142,7 @@ class Store:
         return max(stamp[0], self.history.latest + 1), stamp[1]
 
     def _check_horizon(self, write: Write) -> None:
-        """Raise `DecodeError` if the history neither holds nor takes a write."""
+        """Raise `DecodeError` for a new write that a forgotten deletion may have removed."""
         history = self.history
         if write.time <= history.horizon and not (history.hides(write) or history.provable(write)):
             raise DecodeError(

@@ -45,17 +45,17 @@ def damage(what: str, error: DecodeError) -> Log:
 
 
 class Work:
-    """The step that is being made.
+    """The context of a step: configuration, time, random numbers, and the effects so far.
 
     Args:
-        config: What the replica is.
+        config: Configuration of the replica.
 
     Attributes:
         config: The argument.
         zid: Session of the replica.
-        random: What decides where any choice is right.
+        random: Random numbers, for choices that may be arbitrary.
         now: Time of the step.
-        effects: What there is to do after it.
+        effects: What is to be carried out after the step.
     """
 
     def __init__(self, config: Config) -> None:

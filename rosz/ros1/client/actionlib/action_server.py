@@ -250,10 +250,6 @@ class ActionServer(actions.ActionlibServer):
         self.started = False
         super().stop()
 
-    def update(self, goal: ServerGoal, result: Any = None) -> None:
-        """Let clients know of the state of a goal, and of its result if it has ended."""
-        super().update(goal, result)
-
     def register_goal_callback(self, cb: Callable[[Any], object]) -> None:
         """Replace the function that is called with goals."""
         self.on_goal = cb

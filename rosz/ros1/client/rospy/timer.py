@@ -8,14 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rosz.errors import TimeMovedBackwards
-from rosz.ros1.client.rospy.rostime import (
-    Duration,
-    Time,
-    clock,
-    get_rostime,
-    is_wallclock,
-    wallsleep,
-)
+from rosz.ros1.client.rospy import rostime
 from rosz.ros1.exceptions import ROSInterruptException, ROSTimeMovedBackwardsException
 from rosz.ros1.state import cooperate, is_shutdown, state
 from rosz.time import DurationValue, TimeValue
@@ -48,16 +41,16 @@ def sleep(duration: float | DurationValue) -> None:
     if seconds < 0:
         return
     in_hook = state.hook_thread is threading.current_thread() and not state.lifecycle.closed
-    if in_hook or (state.node is None and is_wallclock()):
+    if in_hook or (state.node is None and rostime.is_wallclock()):
         # As in rospy, a hook may stop a robot and wait for it.
-        wallsleep(seconds)
+        rostime.wallsleep(seconds)
     elif is_shutdown():
         _finish_sleep(seconds)
     else:
         cooperate()
         began = time.monotonic()
         try:
-            slept = clock().sleep(round(seconds * _SECOND))
+            slept = rostime.clock().sleep(round(seconds * _SECOND))
         except TimeMovedBackwards as error:
             raise ROSTimeMovedBackwardsException((error.after - error.before) / _SECOND) from error
         if not slept:
@@ -66,9 +59,9 @@ def sleep(duration: float | DurationValue) -> None:
 
 def _finish_sleep(seconds: float) -> None:
     """Sleep the rest of a sleep that the shutdown interrupts."""
-    if not is_wallclock() or seconds > _FINISHED:
+    if not rostime.is_wallclock() or seconds > _FINISHED:
         raise ROSInterruptException(_SHUT_DOWN)
-    wallsleep(seconds)
+    rostime.wallsleep(seconds)
 
 
 class Rate:
@@ -88,19 +81,19 @@ class Rate:
     """
 
     def __init__(self, hz: float, reset: bool = False) -> None:
-        self.last_time = get_rostime()
-        build: Any = Duration
-        self.sleep_dur: Duration = build(0, int(1e9 / hz))
+        self.last_time = rostime.get_rostime()
+        build: Any = rostime.Duration
+        self.sleep_dur: rostime.Duration = build(0, int(1e9 / hz))
         self._reset = reset
 
     def _remaining(self, curr_time: TimeValue) -> DurationValue:
         if self.last_time > curr_time:
-            self.last_time = Time.from_nsec(curr_time.to_nsec())
+            self.last_time = rostime.Time.from_nsec(curr_time.to_nsec())
         return self.sleep_dur - (curr_time - self.last_time)
 
     def remaining(self) -> DurationValue:
         """Return the duration of the next `sleep`; negative if it is late."""
-        return self._remaining(get_rostime())
+        return self._remaining(rostime.get_rostime())
 
     def sleep(self) -> None:
         """Sleep until the end of the period; not at all if it is over.
@@ -109,13 +102,13 @@ class Rate:
             ROSInterruptException: The node was shut down.
             ROSTimeMovedBackwardsException: ROS time was set back, and `reset` is false.
         """
-        now = get_rostime()
+        now = rostime.get_rostime()
         try:
             sleep(self._remaining(now))
         except ROSTimeMovedBackwardsException:
             if not self._reset:
                 raise
-            self.last_time = get_rostime()
+            self.last_time = rostime.get_rostime()
             return
         self.last_time += self.sleep_dur
         if now - self.last_time > self.sleep_dur * 2:
@@ -135,10 +128,10 @@ class TimerEvent:
 
     def __init__(
         self,
-        last_expected: Time | None,
-        last_real: Time | None,
-        current_expected: Time,
-        current_real: Time,
+        last_expected: rostime.Time | None,
+        last_real: rostime.Time | None,
+        current_expected: rostime.Time,
+        current_real: rostime.Time,
         last_duration: float | None,
     ) -> None:
         self.last_expected = last_expected
@@ -183,8 +176,8 @@ class Timer(threading.Thread):
         """Run the timer; called by the thread."""
         rate = Rate(1.0 / self._period.to_sec(), reset=self._reset)
         expected = rate.last_time + self._period
-        last_expected: Time | None = None
-        last_real: Time | None = None
+        last_expected: rostime.Time | None = None
+        last_real: rostime.Time | None = None
         last_duration: float | None = None
         while not (is_shutdown() or self._shutdown):
             try:
@@ -195,7 +188,7 @@ class Timer(threading.Thread):
                 return
             if is_shutdown() or self._shutdown:
                 return
-            real = get_rostime()
+            real = rostime.get_rostime()
             began = time.monotonic()
             self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
             if self._oneshot:

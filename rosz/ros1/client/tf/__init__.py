@@ -62,6 +62,11 @@ def _strip(frame: str) -> str:
     return frame.removeprefix("/")
 
 
+def _stripped(*call: Any) -> tuple[Any, ...]:
+    """Return the arguments of a call, the names of frames among them without a slash in front."""
+    return tuple(_strip(value) if isinstance(value, str) else value for value in call)
+
+
 def _parts(stamped: TransformStamped) -> Parts:
     t, r = stamped.transform.translation, stamped.transform.rotation
     return [t.x, t.y, t.z], [r.x, r.y, r.z, r.w]
@@ -107,8 +112,8 @@ class Transformer:
         Raises:
             Exception: The transform is not known in time; the text tells the reason.
         """
-        target, source = _strip(target_frame), _strip(source_frame)
-        self._wait(self._buffer.can_transform, target, source, time, timeout)
+        call = _stripped(target_frame, source_frame, time, timeout)
+        self._wait(self._buffer.can_transform, *call)
 
     def _wait(self, can_transform: Callable[..., Any], *call: Any) -> None:
         """Call a method that waits for a transform, or raise tf's own exception."""
@@ -126,9 +131,8 @@ class Transformer:
             ConnectivityException: The frames belong to separate trees.
             ExtrapolationException: The time is before or after all known transforms.
         """
-        return _parts(
-            self._buffer.lookup_transform(_strip(target_frame), _strip(source_frame), time)
-        )
+        call = _stripped(target_frame, source_frame, time)
+        return _parts(self._buffer.lookup_transform(*call))
 
     def lookupTransformFull(  # noqa: N802  # ROS 1's
         self,
@@ -139,10 +143,8 @@ class Transformer:
         fixed_frame: str,
     ) -> Parts:
         """Return the transform between frames at two times; see `lookupTransform`."""
-        target, source, fixed = map(_strip, (target_frame, source_frame, fixed_frame))
-        return _parts(
-            self._buffer.lookup_transform_full(target, target_time, source, source_time, fixed)
-        )
+        call = _stripped(target_frame, target_time, source_frame, source_time, fixed_frame)
+        return _parts(self._buffer.lookup_transform_full(*call))
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> Any:  # noqa: N802  # ROS 1's
         """Return the latest time at which a transform is known."""
@@ -157,10 +159,8 @@ class Transformer:
         fixed_frame: str,
     ) -> bool:
         """Return whether a transform between two times is known; see `lookupTransformFull`."""
-        target, source, fixed = map(_strip, (target_frame, source_frame, fixed_frame))
-        return bool(
-            self._buffer.can_transform_full(target, target_time, source, source_time, fixed)
-        )
+        call = _stripped(target_frame, target_time, source_frame, source_time, fixed_frame)
+        return bool(self._buffer.can_transform_full(*call))
 
     def waitForTransformFull(  # noqa: N802, PLR0917  # ROS 1's
         self,
@@ -173,9 +173,8 @@ class Transformer:
         polling_sleep_duration: Any = None,  # noqa: ARG002  # ROS 1's
     ) -> None:
         """Wait until a transform between two times is known; see `waitForTransform`."""
-        target, source, fixed = map(_strip, (target_frame, source_frame, fixed_frame))
-        call = target, target_time, source, source_time, fixed, timeout
-        self._wait(self._buffer.can_transform_full, *call)
+        call = _stripped(target_frame, target_time, source_frame, source_time, fixed_frame)
+        self._wait(self._buffer.can_transform_full, *call, timeout)
 
     def chain(
         self,

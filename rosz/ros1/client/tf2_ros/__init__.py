@@ -12,17 +12,9 @@ from rosz.errors import RoszError
 from rosz.msgs.actionlib_msgs.msg import GoalStatus
 from rosz.msgs.geometry_msgs.msg import TransformStamped
 from rosz.msgs.tf2_msgs.msg import TF2Error, TFMessage
-from rosz.ros1.client import rospy
+from rosz.ros1.client import rospy, tf2_py
 from rosz.ros1.client.actionlib import ActionServer, ServerGoalHandle, SimpleActionClient
-from rosz.ros1.client.tf2_py import (
-    BufferCore,
-    ConnectivityException,
-    ExtrapolationException,
-    InvalidArgumentException,
-    LookupException,
-    TimeoutException,
-    TransformException,
-)
+from rosz.ros1.client.tf2_py import *  # noqa: F403
 from rosz.ros1.client.tf2_ros import buffer_interface
 from rosz.ros1.client.tf2_ros.buffer import (
     Buffer,
@@ -37,29 +29,22 @@ from rosz.worker import Worker
 __all__: tuple[str, ...] = (
     "Buffer",
     "BufferClient",
-    "BufferCore",
     "BufferServer",
-    "ConnectivityException",
-    "ExtrapolationException",
-    "InvalidArgumentException",
-    "LookupException",
     "StaticTransformBroadcaster",
     "TFMessage",
-    "TimeoutException",
     "TransformBroadcaster",
-    "TransformException",
     "TransformListener",
     "TransformStamped",
 )
-__all__ += buffer_interface.__all__
+__all__ += tf2_py.__all__ + buffer_interface.__all__
 
 _PADDING_SECONDS = 2
-_ERRORS: dict[int, type[TransformException]] = {
-    TF2Error.LOOKUP_ERROR: LookupException,
-    TF2Error.CONNECTIVITY_ERROR: ConnectivityException,
-    TF2Error.EXTRAPOLATION_ERROR: ExtrapolationException,
-    TF2Error.INVALID_ARGUMENT_ERROR: InvalidArgumentException,
-    TF2Error.TIMEOUT_ERROR: TimeoutException,
+_ERRORS: dict[int, type[tf2_py.TransformException]] = {
+    TF2Error.LOOKUP_ERROR: tf2_py.LookupException,
+    TF2Error.CONNECTIVITY_ERROR: tf2_py.ConnectivityException,
+    TF2Error.EXTRAPOLATION_ERROR: tf2_py.ExtrapolationException,
+    TF2Error.INVALID_ARGUMENT_ERROR: tf2_py.InvalidArgumentException,
+    TF2Error.TIMEOUT_ERROR: tf2_py.TimeoutException,
 }
 
 
@@ -128,7 +113,7 @@ class BufferClient(BufferInterface):
         """Return whether a transform is known."""
         try:
             self.lookup_transform(target_frame, source_frame, time, timeout)
-        except TransformException:
+        except tf2_py.TransformException:
             return False
         return True
 
@@ -145,7 +130,7 @@ class BufferClient(BufferInterface):
         call = target_frame, target_time, source_frame, source_time, fixed_frame, timeout
         try:
             self.lookup_transform_full(*call)
-        except TransformException:
+        except tf2_py.TransformException:
             return False
         return True
 
@@ -153,15 +138,17 @@ class BufferClient(BufferInterface):
         goal = self._goal(timeout=timeout or rospy.Duration(0), **fields)
         self.client.send_goal(goal)
         if not self.client.wait_for_result(goal.timeout + self.timeout_padding):
-            raise TimeoutException(f"buffer server '{self.client.ns}' did not answer in time")
+            raise tf2_py.TimeoutException(
+                f"buffer server '{self.client.ns}' did not answer in time"
+            )
         status = self.client.get_state()
         if status != GoalStatus.SUCCEEDED:
-            raise TimeoutException(
+            raise tf2_py.TimeoutException(
                 f"buffer server '{self.client.ns}' ended the lookup with status {status}"
             )
         result = self.client.get_result()
         if result.error.error != TF2Error.NO_ERROR:
-            kind = _ERRORS.get(result.error.error, TransformException)
+            kind = _ERRORS.get(result.error.error, tf2_py.TransformException)
             raise kind(result.error.error_string)
         transform: TransformStamped = result.transform
         return transform
@@ -211,7 +198,7 @@ class BufferServer:
         result = self._result()
         try:
             result.transform = self._look_up(handle.get_goal())
-        except TransformException as error:
+        except tf2_py.TransformException as error:
             number = _NUMBERS.get(type(error), TF2Error.TRANSFORM_ERROR)
             result.error = TF2Error(number, str(error))
         with self._server.lock:

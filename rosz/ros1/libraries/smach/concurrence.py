@@ -6,16 +6,8 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from rosz.ros1.libraries.smach import util
 from rosz.ros1.libraries.smach.container import Container, execute_state, run_user_code
-from rosz.ros1.libraries.smach.util import (
-    InvalidStateError,
-    InvalidTransitionError,
-    SmachError,
-    is_shutdown,
-    logerr,
-    loginfo,
-    logwarn,
-)
 
 _CHECK_PERIOD = 0.1
 """Seconds after which a wait looks whether the program ends."""
@@ -66,7 +58,9 @@ class Concurrence(Container):
             if function and not callable(function)
         ]
         if mistakes:
-            raise InvalidStateError("\n\t".join(("invalid outcomes of a concurrence:", *mistakes)))
+            raise util.InvalidStateError(
+                "\n\t".join(("invalid outcomes of a concurrence:", *mistakes))
+            )
         self._default_outcome = default_outcome
         self._outcome_map: OutcomeMap = outcome_map or {}
         self._outcome_cb = outcome_cb
@@ -105,17 +99,17 @@ class Concurrence(Container):
             InvalidUserCodeError: The function that chooses the outcome failed.
         """
         if not self._states:
-            raise InvalidStateError("cannot execute a concurrence without states")
+            raise util.InvalidStateError("cannot execute a concurrence without states")
         self._ended_early = self._failed = False
         self._child_outcomes = {}
         self._copy_input_keys(parent_ud, self.userdata)
-        loginfo(f"Concurrence starting with userdata: \n\t{self.userdata.keys()}")
+        util.loginfo(f"Concurrence starting with userdata: \n\t{self.userdata.keys()}")
         self.call_start_cbs()
         self._is_running = True
         try:
             self._run()
             if self._failed:
-                raise InvalidStateError("a state of a concurrence failed")
+                raise util.InvalidStateError("a state of a concurrence failed")
             serviced = self.preempt_requested() and self._serviced_preempt()
             outcome = "preempted" if serviced else self._choose()
         finally:
@@ -140,12 +134,12 @@ class Concurrence(Container):
         for label in self.get_active_states():
             self._states[label].request_preempt()
         for thread in threads:
-            while thread.is_alive() and not is_shutdown():
+            while thread.is_alive() and not util.is_shutdown():
                 thread.join(_CHECK_PERIOD)
 
     def _is_decided(self) -> bool:
         over = self._ended_early or self._failed or self.preempt_requested()
-        return over or not self.get_active_states() or is_shutdown()
+        return over or not self.get_active_states() or util.is_shutdown()
 
     def _run_state(self, label: str) -> None:
         try:
@@ -158,7 +152,7 @@ class Concurrence(Container):
                     self._child_outcomes,
                 ):
                     self._ended_early = True
-        except SmachError:  # which has written itself to the log
+        except util.SmachError:  # which has written itself to the log
             self._failed = True
         finally:
             with self._done_cond:
@@ -169,24 +163,24 @@ class Concurrence(Container):
         what = f"concurrent state '{label}'"
         outcome = execute_state(what, self._states[label], self.userdata, self._remappings[label])
         if outcome is None:
-            raise InvalidStateError(f"concurrent state '{label}' returned no outcome")
-        loginfo(f"Concurrent state '{label}' returned outcome '{outcome}' on termination.")
+            raise util.InvalidStateError(f"concurrent state '{label}' returned no outcome")
+        util.loginfo(f"Concurrent state '{label}' returned outcome '{outcome}' on termination.")
         return outcome
 
     def _serviced_preempt(self) -> bool:
         """Return whether all states have ended so; the request to others is withdrawn."""
         missed = [label for label, state in self._states.items() if state.preempt_requested()]
         for label in missed:
-            logwarn(f"State '{label}' in concurrence did not service preempt.")
+            util.logwarn(f"State '{label}' in concurrence did not service preempt.")
             self._states[label].recall_preempt()
         if not missed:
-            loginfo("Concurrence serviced preempt.")
+            util.loginfo("Concurrence serviced preempt.")
             self.service_preempt()
         return not missed
 
     def _choose(self) -> Any:
         """Return the outcome that follows from those of the states."""
-        loginfo(f"Concurrent Outcomes: {self._child_outcomes}")
+        util.loginfo(f"Concurrent Outcomes: {self._child_outcomes}")
         ended = self._child_outcomes.items()
         fitting = [name for name, given in self._outcome_map.items() if given.items() <= ended]
         outcome: Any = max(
@@ -198,8 +192,8 @@ class Concurrence(Container):
         if isinstance(chosen, str) and chosen:
             return chosen
         if chosen:
-            logerr(f"the outcome callback returned {chosen!r}, which is not a string")
-        logwarn(f"the outcome callback chose no outcome: it is '{outcome}'")
+            util.logerr(f"the outcome callback returned {chosen!r}, which is not a string")
+        util.logwarn(f"the outcome callback chose no outcome: it is '{outcome}'")
         return outcome
 
     def request_preempt(self) -> None:
@@ -215,7 +209,9 @@ class Concurrence(Container):
     def set_initial_state(self, initial_states: Sequence[str], userdata: Any) -> None:
         """Set user data; a concurrence always begins with all states."""
         if initial_states and set(initial_states) != self._states.keys():
-            logwarn(f"a concurrence begins with all its states, not only {list(initial_states)}")
+            util.logwarn(
+                f"a concurrence begins with all its states, not only {list(initial_states)}"
+            )
         self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
@@ -234,10 +230,12 @@ class Concurrence(Container):
         """Check that the states have the outcomes that the outcome map names."""
         for outcome, label, _ in self.get_internal_edges():
             if label not in self._states:
-                raise InvalidStateError(f"the outcome map names '{label}', which is not a state")
+                raise util.InvalidStateError(
+                    f"the outcome map names '{label}', which is not a state"
+                )
             registered = self._states[label].get_registered_outcomes()
             if outcome not in registered:
-                raise InvalidTransitionError(
+                raise util.InvalidTransitionError(
                     f"the outcome map names outcome '{outcome}' of state '{label}', which has only"
                     f" {list(registered)}"
                 )

@@ -8,16 +8,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, ClassVar, Self
 
+from rosz.ros1.libraries.smach import util
 from rosz.ros1.libraries.smach.state import State
 from rosz.ros1.libraries.smach.user_data import Remapper, UserData
-from rosz.ros1.libraries.smach.util import (
-    InvalidConstructionError,
-    InvalidStateError,
-    InvalidTransitionError,
-    InvalidUserCodeError,
-    logerr,
-    logwarn,
-)
 
 __all__ = ("Container", "run_user_code")
 
@@ -31,11 +24,11 @@ def run_user_code(what: str, function: Callable[..., Any], *arguments: Any) -> A
     """
     try:
         return function(*arguments)
-    except InvalidUserCodeError:
-        logerr(f"{what} failed")
+    except util.InvalidUserCodeError:
+        util.logerr(f"{what} failed")
         raise
     except Exception as error:
-        raise InvalidUserCodeError(f"{what} failed: {traceback.format_exc()}") from error
+        raise util.InvalidUserCodeError(f"{what} failed: {traceback.format_exc()}") from error
 
 
 def execute_state(what: str, state: Any, userdata: UserData, remapping: Mapping[str, str]) -> Any:
@@ -79,7 +72,7 @@ class Container(State):
 
     def __getitem__(self, key: str) -> Any:
         if key not in self._states:
-            logerr(f"the container has no state '{key}'; there are {list(self._states)}")
+            util.logerr(f"the container has no state '{key}'; there are {list(self._states)}")
             raise KeyError(key)
         return self._states[key]
 
@@ -165,9 +158,9 @@ class Container(State):
             self.close()
             return
         self._leave()
-        if not issubclass(failure[0], InvalidStateError | InvalidTransitionError):
+        if not issubclass(failure[0], util.InvalidStateError | util.InvalidTransitionError):
             text = "".join(traceback.format_exception(*failure))
-            logerr(f"the construction of a container failed:\n{text}")
+            util.logerr(f"the construction of a container failed:\n{text}")
 
     @contextmanager
     def opened(self, **kwargs: Any) -> Iterator[Self]:
@@ -192,15 +185,15 @@ class Container(State):
             InvalidStateError: Another container was opened after this one.
         """
         if not self.is_opened():
-            raise InvalidStateError("cannot close a container that is not the one opened last")
+            raise util.InvalidStateError("cannot close a container that is not the one opened last")
         self._leave()
         self._is_consistent()
 
     def _is_consistent(self) -> bool:
         try:
             self.check_consistency()
-        except (InvalidStateError, InvalidTransitionError):
-            logerr("Container consistency check failed.")
+        except (util.InvalidStateError, util.InvalidTransitionError):
+            util.logerr("Container consistency check failed.")
             return False
         return True
 
@@ -220,15 +213,17 @@ class Container(State):
             InvalidConstructionError: It is not.
         """
         if not self.is_opened():
-            raise InvalidConstructionError(msg)
+            raise util.InvalidConstructionError(msg)
 
     @classmethod
     def _currently_opened_container(cls) -> Self:
         if not Container._construction_stack:
-            raise InvalidStateError("no container is open: add states within 'with container:'")
+            raise util.InvalidStateError(
+                "no container is open: add states within 'with container:'"
+            )
         opened = Container._construction_stack[-1]
         if not isinstance(opened, cls):
-            raise InvalidStateError(
+            raise util.InvalidStateError(
                 f"the open container is a {type(opened).__name__}, not a {cls.__name__}"
             )
         return opened
@@ -241,7 +236,7 @@ def _copy(keys: Iterable[str], source: Any, target: Any) -> None:
         try:
             target[key] = source[key]
         except KeyError:
-            logwarn(f"user data has no key '{key}', which a container declares")
+            util.logwarn(f"user data has no key '{key}', which a container declares")
 
 
 def _call_all(kind: str, callbacks: Callbacks, *arguments: Any) -> None:
@@ -249,4 +244,4 @@ def _call_all(kind: str, callbacks: Callbacks, *arguments: Any) -> None:
         for callback, more in callbacks:
             callback(*arguments, *more)
     except Exception:  # noqa: BLE001  # the callback boundary
-        logerr(f"Could not execute {kind} callback: {traceback.format_exc()}")
+        util.logerr(f"Could not execute {kind} callback: {traceback.format_exc()}")

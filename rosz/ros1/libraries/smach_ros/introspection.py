@@ -14,11 +14,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from rosz.msgs.smach_msgs.msg import (
-    SmachContainerInitialStatusCmd,
-    SmachContainerStatus,
-    SmachContainerStructure,
-)
+from rosz.msgs.smach_msgs import msg
 from rosz.msgs.std_msgs.msg import Header
 from rosz.ros1.client import rospy
 from rosz.ros1.libraries.smach import Container, UserData
@@ -90,18 +86,18 @@ class IntrospectionClient:
             Whether it confirmed; None without a timeout.
         """
         values = UserData() if initial_userdata is None else initial_userdata
-        command = SmachContainerInitialStatusCmd(path, list(initial_states), _packed(values))
+        command = msg.SmachContainerInitialStatusCmd(path, list(initial_states), _packed(values))
         confirmed = threading.Event()
 
-        def receive(status: SmachContainerStatus) -> None:
+        def receive(status: msg.SmachContainerStatus) -> None:
             if status.path == path and set(initial_states) <= set(status.initial_states):
                 there = _unpacked(status.local_data)
                 if all(key in there and there[key] == values[key] for key in values.keys()):  # noqa: SIM118
                     confirmed.set()
 
-        subscriber = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, receive)
+        subscriber = rospy.Subscriber(server + STATUS_TOPIC, msg.SmachContainerStatus, receive)
         publisher = rospy.Publisher(
-            server + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1
+            server + INIT_TOPIC, msg.SmachContainerInitialStatusCmd, queue_size=1
         )
         publisher.publish(command)
         if timeout is None:
@@ -127,13 +123,13 @@ class ContainerProxy:
         self._status_pub_lock = threading.Lock()
         self._stopped = threading.Event()
         self._structure_pub = rospy.Publisher(
-            server_name + STRUCTURE_TOPIC, SmachContainerStructure, queue_size=1
+            server_name + STRUCTURE_TOPIC, msg.SmachContainerStructure, queue_size=1
         )
         self._status_pub = rospy.Publisher(
-            server_name + STATUS_TOPIC, SmachContainerStatus, queue_size=1
+            server_name + STATUS_TOPIC, msg.SmachContainerStatus, queue_size=1
         )
         self._init_cmd = rospy.Subscriber(
-            server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._init_cmd_cb
+            server_name + INIT_TOPIC, msg.SmachContainerInitialStatusCmd, self._init_cmd_cb
         )
         container.register_transition_cb(self._transition_cb)
 
@@ -158,7 +154,7 @@ class ContainerProxy:
     def _publish_structure(self, _info: str = "") -> None:
         edges = [tuple(map(str, edge)) for edge in self._container.get_internal_edges()]
         self._structure_pub.publish(
-            SmachContainerStructure(
+            msg.SmachContainerStructure(
                 Header(stamp=rospy.Time.now()),
                 self._path,
                 list(self._container.get_children()),
@@ -172,7 +168,7 @@ class ContainerProxy:
     def _publish_status(self, info: str = "") -> None:
         with self._status_pub_lock:
             self._status_pub.publish(
-                SmachContainerStatus(
+                msg.SmachContainerStatus(
                     Header(stamp=rospy.Time.now()),
                     self._path,
                     self._container.get_initial_states(),
@@ -185,7 +181,7 @@ class ContainerProxy:
     def _transition_cb(self, *args: Any, **kwargs: Any) -> None:
         self._publish_status(f"{args}, {kwargs}")
 
-    def _init_cmd_cb(self, message: SmachContainerInitialStatusCmd) -> None:
+    def _init_cmd_cb(self, message: msg.SmachContainerInitialStatusCmd) -> None:
         if message.path != self._path:
             return
         children = self._container.get_children()

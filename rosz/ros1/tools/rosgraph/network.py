@@ -92,11 +92,8 @@ def get_address_override() -> str | None:
 
 def get_host_name() -> str:
     """Return the name by which other machines reach this one."""
-    override = get_address_override()
-    if override:
-        return override
-    name = socket.gethostname()
-    return get_local_address() if not name or name == "localhost" else name
+    name = get_address_override() or socket.gethostname()
+    return get_local_address() if name in {"", "localhost"} else name
 
 
 def get_local_address() -> str:

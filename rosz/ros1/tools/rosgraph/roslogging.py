@@ -36,7 +36,7 @@ def makedirs_with_parent_perms(p: str) -> None:
 
 
 def renew_latest_logdir(logfile_dir: str) -> bool:
-    """Make ``latest``, beside a folder of logs, a link to that folder; return whether it is one."""
+    """Link ``latest``, beside a log folder, to it; return False if it is a real file or folder."""
     latest = Path(logfile_dir).parent / "latest"
     if latest.exists() and not latest.is_symlink():
         return False

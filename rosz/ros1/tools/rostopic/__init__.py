@@ -3,8 +3,6 @@
 The command is that of rosz; ``rostopicmain`` runs it. It may import floors 0 to 6, and rospy.
 """
 
-from __future__ import annotations
-
 from rosz.ros1.tool import Tool
 from rosz.ros1.tools.rostopic import topics
 from rosz.ros1.tools.rostopic.callbacks import (

@@ -7,18 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from rosz.introspect import (
-    BandwidthMeter,
-    DelayMeter,
-    RateMeter,
-    format_bandwidth,
-    format_delay,
-    format_rate,
-    format_rates,
-    plot_columns,
-    plot_values,
-    shorten,
-)
+from rosz import introspect
 from rosz.message import strify_message
 from rosz.ros1.client import rospy
 from rosz.ros1.state import ready_context
@@ -56,7 +45,7 @@ def create_value_transform(echo_nostr: bool, echo_noarr: bool) -> Callable[..., 
     """
 
     def transform(val: Any, type_information: str | None = None) -> Any:
-        return shorten(val, type_information or "", echo_noarr, echo_nostr)
+        return introspect.shorten(val, type_information or "", echo_noarr, echo_nostr)
 
     return transform
 
@@ -67,7 +56,7 @@ def _all_fields(message: Any) -> Iterable[str]:
 
 
 def _str_plot_fields(val: Any, f: str, field_filter: FieldFilter | None) -> str:
-    return f"time,{','.join(plot_columns(val, f, field_filter or _all_fields))}"
+    return f"time,{','.join(introspect.plot_columns(val, f, field_filter or _all_fields))}"
 
 
 def _str_plot(
@@ -82,7 +71,7 @@ def _str_plot(
     if current_time is None:
         stamped = getattr(val, "_has_header", False)
         current_time = val.header.stamp if stamped else rospy.get_rostime()
-    values = plot_values(val, offset, field_filter or _all_fields)
+    values = introspect.plot_values(val, offset, field_filter or _all_fields)
     return f"{current_time.to_nsec() - offset},{','.join(values)}"
 
 
@@ -210,13 +199,13 @@ class ROSTopicHz:
         self.window_size = window_size
         self.filter_expr = filter_expr
         self.use_wtime = use_wtime
-        self._meters: dict[str | None, RateMeter] = {}
+        self._meters: dict[str | None, introspect.RateMeter] = {}
 
-    def _meter(self, topic: str | None) -> RateMeter:
+    def _meter(self, topic: str | None) -> introspect.RateMeter:
         meter = self._meters.get(topic)
         if meter is None:
             window = None if self.window_size < 0 else self.window_size
-            meter = self._meters.setdefault(topic, RateMeter(window))
+            meter = self._meters.setdefault(topic, introspect.RateMeter(window))
         return meter
 
     def callback_hz(self, m: Any, topic: str | None = None) -> None:
@@ -242,9 +231,9 @@ class ROSTopicHz:
         """Write the measured rates to stdout."""
         names = list(topics)
         if len(names) == 1:
-            text = format_rate(self._meter(names[0]).stats())
+            text = introspect.format_rate(self._meter(names[0]).stats())
         else:
-            text = format_rates({str(name): self._meter(name).stats() for name in names})
+            text = introspect.format_rates({str(name): self._meter(name).stats() for name in names})
         sys.stdout.write(f"{text}\n")
 
 
@@ -257,7 +246,7 @@ class ROSTopicDelay:
 
     def __init__(self, window_size: int) -> None:
         self.window_size = window_size
-        self._meter = DelayMeter(None if window_size < 0 else window_size)
+        self._meter = introspect.DelayMeter(None if window_size < 0 else window_size)
 
     def callback_delay(self, msg: Any) -> None:
         """Count a message; one without a header is an error of the log."""
@@ -276,7 +265,7 @@ class ROSTopicDelay:
     def print_delay(self) -> None:
         """Write the measured delay to stdout, once there is one."""
         if self._meter.begun:
-            sys.stdout.write(f"{format_delay(self._meter.stats())}\n")
+            sys.stdout.write(f"{introspect.format_delay(self._meter.stats())}\n")
 
 
 class ROSTopicBandwidth:
@@ -288,7 +277,7 @@ class ROSTopicBandwidth:
 
     def __init__(self, window_size: int = 100) -> None:
         self.window_size = window_size or 100
-        self._meter = BandwidthMeter(self.window_size)
+        self._meter = introspect.BandwidthMeter(self.window_size)
 
     def callback(self, data: Any) -> None:
         """Count a message."""
@@ -298,4 +287,4 @@ class ROSTopicBandwidth:
         """Write the measured bandwidth to stdout, once there are two messages."""
         stats = self._meter.stats(time.monotonic_ns())
         if stats is not None:
-            sys.stdout.write(f"{format_bandwidth(stats)}\n")
+            sys.stdout.write(f"{introspect.format_bandwidth(stats)}\n")

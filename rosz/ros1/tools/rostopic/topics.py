@@ -11,17 +11,8 @@ from typing import Any
 
 import yaml
 
+from rosz import introspect
 from rosz.errors import EncodeError, NotFoundError, RoszError, TypeNotFound, UsageError
-from rosz.introspect import (
-    ONCE_SECONDS,
-    FieldPath,
-    Survey,
-    find_target,
-    format_topic,
-    list_topics,
-    make_message,
-    topics_of_type,
-)
 from rosz.names import ros1_type
 from rosz.ros1.client import rospy
 from rosz.ros1.client.genpy import get_message_class, get_printable_message_args
@@ -30,26 +21,6 @@ from rosz.ros1.state import find, has_node, ready_context, survey
 from rosz.ros1.tools.rosgraph.masterapi import Master
 from rosz.ros1.tools.rosgraph.names import script_resolve_name
 from rosz.wire import Kind
-
-__all__ = (
-    "NAME",
-    "SUBSCRIBER_TIMEOUT",
-    "ROSTopicException",
-    "ROSTopicIOException",
-    "argv_publish",
-    "create_publisher",
-    "file_yaml_arg",
-    "find_by_type",
-    "get_info_text",
-    "get_topic_class",
-    "get_topic_list",
-    "get_topic_type",
-    "msgevalgen",
-    "param_publish_once",
-    "publish_message",
-    "stdin_yaml_arg",
-    "wait_for_subscriber",
-)
 
 NAME = "rostopic"
 _LOOK_SECONDS = 0.1
@@ -81,14 +52,14 @@ def msgevalgen(pattern: str) -> FieldReader | None:
         None if the pattern is empty, or invalid, which is written to stderr.
     """
     try:
-        path = FieldPath(pattern)
+        path = introspect.FieldPath(pattern)
     except UsageError as error:
         sys.stderr.write(f"{error}\n")
         return None
     return functools.partial(_follow, path, path.steps) if path.steps else None
 
 
-def _follow(path: FieldPath, steps: Sequence[Any], value: Any) -> Any:
+def _follow(path: introspect.FieldPath, steps: Sequence[Any], value: Any) -> Any:
     """Return the field at the end of some steps; None, and a line on stderr, if there is none."""
     for number, step in enumerate(steps, 1):
         try:
@@ -130,7 +101,9 @@ def get_topic_type(topic: str, blocking: bool = False) -> Found:
 
 def _find(topic: str) -> Found:
     try:
-        target = find(lambda view: find_target(topic, view.topics(), type_store().message))
+        target = find(
+            lambda view: introspect.find_target(topic, view.topics(), type_store().message)
+        )
     except TypeNotFound:
         raise
     except NotFoundError:
@@ -159,7 +132,7 @@ def get_topic_class(
 
 def find_by_type(topic_type: str) -> list[str]:
     """Return the names of the topics of a type."""
-    return topics_of_type(list_topics(survey().view.tokens), topic_type)
+    return introspect.topics_of_type(introspect.list_topics(survey().view.tokens), topic_type)
 
 
 def get_topic_list(master: Master | None = None) -> tuple[list[Any], list[Any]]:  # noqa: ARG001
@@ -175,7 +148,7 @@ def get_topic_list(master: Master | None = None) -> tuple[list[Any], list[Any]]:
     return _with_nodes(alive, Kind.PUBLISHER), _with_nodes(alive, Kind.SUBSCRIPTION)
 
 
-def _with_nodes(alive: Survey, kind: Kind) -> list[Any]:
+def _with_nodes(alive: introspect.Survey, kind: Kind) -> list[Any]:
     topics: dict[str, tuple[str, dict[str, None]]] = {}
     for token in alive.view.entities(kind):
         _, nodes = topics.setdefault(token.name, (ros1_type(token.name, token.type_name), {}))
@@ -190,7 +163,7 @@ def get_info_text(topic: str) -> str:
         ROSTopicException: The topic has no publishers and no subscribers.
     """
     try:
-        return format_topic(survey(), topic)
+        return introspect.format_topic(survey(), topic)
     except RoszError as error:
         raise ROSTopicException(f"Unknown topic {topic}") from error
 
@@ -251,7 +224,7 @@ def publish_message(  # noqa: PLR0917  # ROS 1's
     message = _make(msg_class, pub_args)
     if rate is None:
         what = f"[{message}]" if verbose else "message"
-        end = f" for {ONCE_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
+        end = f" for {introspect.ONCE_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
         sys.stdout.write(f"publishing and latching {what}{end}\n")
         pub.publish(message)
         if not once:
@@ -269,7 +242,7 @@ def publish_message(  # noqa: PLR0917  # ROS 1's
 
 def _make(cls: type[Any], arguments: Sequence[Any]) -> Any:
     try:
-        return make_message(cls, arguments, rospy.get_rostime().to_nsec())
+        return introspect.make_message(cls, arguments, rospy.get_rostime().to_nsec())
     except EncodeError as error:
         raise ROSTopicException(
             f"{error}\n\nArgs are: [{get_printable_message_args(cls())}]"
@@ -288,7 +261,7 @@ def argv_publish(  # noqa: PLR0917  # ROS 1's
     """Publish a message as `publish_message`; if once, stay until late subscribers have it."""
     publish_message(pub, msg_class, pub_args, rate, once, verbose, substitute_keywords)
     if once:
-        rospy.rostime.wallsleep(ONCE_SECONDS)
+        rospy.rostime.wallsleep(introspect.ONCE_SECONDS)
 
 
 def param_publish_once(pub: Any, msg_class: type[Any], param_name: str, verbose: bool) -> None:

@@ -9,7 +9,9 @@ rospy.init_node("slow_server")
 
 def handle(request):
     print("ready")
-    rospy.sleep(1)
+    while not rospy.is_shutdown():
+        rospy.rostime.wallsleep(0.01)
+    rospy.rostime.wallsleep(1)
     return True, "slept"
 
 

@@ -14,6 +14,7 @@ def tick(event):
     events.append(event)
     if len(events) == 4:
         timer.shutdown()
+        single.join(60)
         rospy.signal_shutdown("four ticks")
 
 
@@ -21,11 +22,10 @@ def only(event):
     once.append(event)
 
 
-timer = rospy.Timer(rospy.Duration(0.05), tick)
 single = rospy.Timer(rospy.Duration(0.01), only, oneshot=True)
+timer = rospy.Timer(rospy.Duration(0.05), tick)
 print(timer.is_alive(), timer.daemon, isinstance(timer, threading.Thread))
 rospy.spin()
-single.join(60)
 first, second = events[0], events[1]
 print(first.last_expected, first.last_real, first.last_duration)
 print(type(first.current_expected).__name__, type(first.current_real).__name__)

@@ -36,6 +36,8 @@ def callback(message):
 guest = rospy.Subscriber("party", String, callback)
 came.wait(60)
 both.wait(60)
+while guest.get_num_connections() < 1:
+    rospy.sleep(0.01)
 print(sorted(texts), publisher.get_num_connections(), guest.get_num_connections())
 guest.unregister()
 went.wait(60)

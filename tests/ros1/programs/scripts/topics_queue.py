@@ -9,8 +9,11 @@ from std_msgs.msg import Int32
 rospy.init_node("slow")
 
 
-def run(size):
-    started, go, seen = threading.Event(), threading.Event(), []
+go = threading.Event()
+
+
+def begin(size):
+    started, seen = threading.Event(), []
 
     def callback(message):
         seen.append(message.data)
@@ -19,7 +22,7 @@ def run(size):
             go.wait(60)
 
     topic = "numbers_%s" % size
-    subscriber = rospy.Subscriber(topic, Int32, callback, queue_size=size)
+    rospy.Subscriber(topic, Int32, callback, queue_size=size)
     publisher = rospy.Publisher(topic, Int32, queue_size=100)
     while publisher.get_num_connections() < 1:
         rospy.sleep(0.01)
@@ -27,14 +30,14 @@ def run(size):
     started.wait(60)
     for number in range(1, 11):
         publisher.publish(number)
-    rospy.sleep(1)
-    go.set()
-    deadline = rospy.get_time() + 60
+    return size, seen
+
+
+begun = [begin(size) for size in (1, 2, 5, 100, None)]
+rospy.sleep(1)
+go.set()
+deadline = rospy.get_time() + 60
+for size, seen in begun:
     while seen[-1] != 10 and rospy.get_time() < deadline:
         rospy.sleep(0.01)
     print(size, seen)
-    subscriber.unregister()
-
-
-for size in (1, 2, 5, 100, None):
-    run(size)
