@@ -105,7 +105,7 @@ class Container:
         threading.excepthook = self._report_thread
         # A crash in C ends all nodes: the stack of its thread tells which one was at fault.
         faulthandler.enable(all_threads=False)
-        sys.stdout = _WholeLines(sys.stdout)
+        sys.stdout, sys.stderr = _WholeLines(sys.stdout), _WholeLines(sys.stderr)
         for spec in self._specs:
             thread = threading.Thread(
                 target=self._supervise, args=(spec,), name=f"rosz-program{spec.name}", daemon=True
@@ -166,7 +166,8 @@ class Container:
             except BaseException as error:  # noqa: BLE001  # the boundary of the user's program
                 code, problem = self._failed(script, error)
         program.end()
-        sys.stdout.flush()  # the end of a line that it has not completed
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()  # the end of a line that it has not completed
         self._report_end(spec, code, problem)
         return code
 

@@ -159,6 +159,33 @@ def test_crashes_of_threads_and_in_c_name_the_program(site: Site) -> None:
     assert re.search(r'Segmentation fault\n(.*\n)*  File ".*fatal.py", line \d+', pair.output)
 
 
+def test_lines_of_one_program_are_not_mixed_with_errors_of_another(site: Site) -> None:
+    site.add("pk", "shouter.py", "import rosz\nfor i in range(2000): print('shout', i, 'end')\n")
+    failing = """
+        import threading, rosz
+        def fail():
+            raise ValueError("broken in a thread")
+        for _ in range(200):
+            thread = threading.Thread(target=fail)
+            thread.start()
+            thread.join()
+    """
+    site.add("pk", "failing.py", failing)
+    launch = site.launch(
+        """
+        <group container="box">
+          <node pkg="pk" type="shouter.py" name="s1" output="screen"/>
+          <node pkg="pk" type="failing.py" name="f1" output="screen"/>
+        </group>
+        """
+    )
+    assert launch.exit_code() == 0
+    lines = [line for line in launch.lines if "shout " in line or line.startswith("ValueError")]
+    assert len(lines) == 2000 + 200
+    whole = re.compile(r"shout \d+ end|ValueError: broken in a thread")
+    assert [line for line in lines if not whole.fullmatch(line)] == []
+
+
 def test_modules_of_one_name_beside_two_scripts_are_refused(site: Site) -> None:
     for package in ("one", "two"):
         site.add(package, "config.py", f"PLACE = '{package}'")
