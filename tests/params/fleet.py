@@ -155,6 +155,7 @@ class Cable:
         self._lock = threading.Lock()
         self._whole = threading.Event()
         self._flowing = threading.Event()
+        self._until_hold = 0
         self._whole.set()
         self._flowing.set()
         self.port = int(self._listener.getsockname()[1])
@@ -170,9 +171,11 @@ class Cable:
         """Let connections through again."""
         self._whole.set()
 
-    def hold(self) -> None:
-        """Keep the connection, and let nothing through."""
-        self._flowing.clear()
+    def hold(self, after: int = 0) -> None:
+        """Keep the connection, and let nothing through, once so many bytes have passed."""
+        self._until_hold = after
+        if not after:
+            self._flowing.clear()
 
     def release(self) -> None:
         """Let through what was held."""
@@ -217,6 +220,10 @@ class Cable:
             while data := source.recv(65536):
                 self._flowing.wait()
                 sink.sendall(data)
+                if self._until_hold:
+                    self._until_hold -= len(data)
+                    if self._until_hold <= 0:
+                        self.hold()
         except OSError:
             pass
         finally:

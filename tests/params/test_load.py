@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from rosz.errors import WaitTimeout
-from rosz.params.replica import ParamClient
+from rosz.params.replica import Outcome, ParamClient
 from rosz.params.writes import Change
 from rosz.session import Session, SessionConfig
 
-from .fleet import Fleet, Process
+from .fleet import Cable, Fleet, Process
 
-LIMIT = 0.5
-"""Seconds without any sign of progress; each of these batches takes longer as a whole."""
+LIMIT = 2.0
+"""Seconds without any sign of progress, which each process reports ten times in a second."""
 
 MEMBERS = 3
 
@@ -34,10 +35,17 @@ def members(fleet: Fleet) -> dict[str, Process]:
 
 
 @pytest.fixture
-def client(fleet: Fleet, members: dict[str, Process]) -> Iterator[ParamClient]:
+def cable(fleet: Fleet, members: dict[str, Process]) -> Iterator[Cable]:
     assert len(members) == MEMBERS
-    config = SessionConfig(mode="client", rendezvous=fleet.rendezvous, must_connect=True)
-    with Session.open(config) as session:
+    cable = Cable(int(fleet.rendezvous.rpartition(":")[2]))
+    yield cable
+    cable.close()
+
+
+@pytest.fixture
+def client(cable: Cable) -> Iterator[ParamClient]:
+    place = f"tcp/127.0.0.1:{cable.port}"
+    with Session.open(SessionConfig(mode="client", rendezvous=place, must_connect=True)) as session:
         yield ParamClient(session, timeout=LIMIT)
 
 
@@ -49,14 +57,26 @@ def large(megabytes: int) -> list[Change]:
     return [((f"text{number}",), "x" * 1_000_000) for number in range(megabytes)]
 
 
-@pytest.mark.parametrize("changes", [many(100_000), large(40)], ids=["many", "large"])
-def test_size_alone_passes_no_limit(client: ParamClient, changes: list[Change]) -> None:
-    seen: list[int] = []
-    outcome = client.write(changes, lambda holders, _: seen.append(holders))
+def check_all_have_it(client: ParamClient, outcome: Outcome) -> None:
     assert outcome.slow == ()
     assert outcome.holders == MEMBERS
-    assert len(seen) > 1
     assert client.silent == []
+
+
+def test_a_batch_that_is_applied_for_long(client: ParamClient) -> None:
+    seen: list[int] = []
+    outcome = client.write(many(120_000), lambda holders, _: seen.append(holders))
+    check_all_have_it(client, outcome)
+    assert len(seen) > 1
+
+
+def test_a_batch_that_is_sent_for_long(client: ParamClient, cable: Cable) -> None:
+    cable.hold(after=1_000_000)
+    release = threading.Timer(2 * LIMIT, cable.release)
+    release.start()
+    outcome = client.write(large(40))
+    release.join()
+    check_all_have_it(client, outcome)
 
 
 def test_one_that_stops_in_the_midst_is_named(
