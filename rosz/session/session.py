@@ -272,6 +272,7 @@ class Session(Closing):
         fit: Callable[[int], int] | None = None,
         history: int = 0,
         recover: bool = False,
+        remote_only: bool = False,
     ) -> Closable:
         """Declare a subscriber that keeps the newest samples, and handles them one at a time.
 
@@ -284,8 +285,11 @@ class Session(Closing):
                 should rarely fall.
             history: The number of samples to ask each transient-local publisher for.
             recover: Whether to notice and fetch samples that were missed.
+            remote_only: Whether to ignore samples of this session itself.
         """
-        declare = partial(self._subscribe, key, history=history, recover=recover, remote_only=False)
+        declare = partial(
+            self._subscribe, key, history=history, recover=recover, remote_only=remote_only
+        )
         return QueueSubscriber(key, declare, depth, handle, fit=fit, history=bool(history))
 
     def _subscribe(

@@ -50,6 +50,9 @@ _SENDERS: Final = 4
 _MAX_UNSENT: Final = 100
 """Messages that wait for full links; the sizes of messages are not bounded."""
 
+_MAX_UNRECEIVED: Final = 4096
+"""Messages of others that wait; one that is dropped is not acknowledged, and so sent once more."""
+
 _DAMAGED_QUERY: Final = "a replica sent a damaged query"
 _DAMAGED_REPLY: Final = "a replica sent a damaged reply"
 _BUSY: Final = "this replica has too many queries; send it again later"
@@ -110,7 +113,7 @@ class Exchange:
         session, keys = self._session, self._keys
         for key in (keys.change, f"{keys.scoped_change(session.zid)}/**"):
             self._declared.append(
-                session.subscriber(key, self._on_change, remote_only=True, rare=True)
+                session.queue_subscriber(key, _MAX_UNRECEIVED, self._on_change, remote_only=True)
             )
         purposes: tuple[Purpose, ...] = ("write", "sync", "tell")
         for purpose in purposes:
