@@ -207,8 +207,7 @@ class OutputRelay:
         self._reply({"id": owner, "tail": list(self.tails.get(owner, ()))})
 
     def _answer(self, request: dict[str, Any]) -> None:
-        newest = self.newest.get(request["id"])
-        begin, data = (0, b"") if newest is None else newest.after(request["after"])
+        begin, data = self.newest.get(request["id"], Newest()).after(request["after"])
         text = base64.b64encode(data).decode()
         self._reply({"read": request["number"], "begin": begin, "data": text})
 
