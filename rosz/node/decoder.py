@@ -62,16 +62,15 @@ Received = tuple[Any, MessageInfo | None]
 
 
 class _Publisher:
-    """The last sequence number of a publisher, and whether its samples may be replayed."""
+    """The last sample and the first live one of a publisher; events count after newer ones, too."""
 
-    __slots__ = ("_before", "_replayed", "last", "replays")
+    __slots__ = ("_before", "_late", "_replayed", "events", "last", "oldest", "replays")
 
     def __init__(self) -> None:
-        self.last = 0
-        self.replays = False
+        self.last = self.oldest = self._late = 0
+        self.replays = self.events = False
         # The first sample of a replay that no live one has followed yet, and the last before it.
-        self._replayed = 0
-        self._before = 0
+        self._replayed = self._before = 0
 
     def advance(self, sequence: int, *, replayed: bool) -> int | None:
         """Return the number of samples missing before one; ``None`` if that is a repetition.
@@ -79,14 +78,18 @@ class _Publisher:
         A replay comes on a way of its own, and may overtake live samples that wait to be decoded.
         """
         last, first, before = self.last, self._replayed, self._before
+        if replayed and self.events and self._late < sequence < self.oldest:
+            self._late = sequence
+            return 0
         if sequence <= last and (replayed or sequence >= first):
             return None
         self.last = sequence
         if replayed:
+            self._late = sequence
             if not first:
                 self._replayed, self._before = sequence, last
             return 0
-        self._replayed = 0
+        self._replayed, self.oldest = 0, self.oldest or sequence
         if first and sequence > last:
             return sequence - last - 1 + (first - before - 1 if before else 0)
         if first:
@@ -133,12 +136,13 @@ class SampleDecoder:
         self._publishers: dict[bytes, _Publisher] = {}
         self._reported: set[str] = set()
 
-    def expect_replay(self, gid: bytes) -> None:
-        """Expect the samples of a publisher twice: live, and from its cache.
+    def expect_replay(self, gid: bytes, *, events: bool = False) -> None:
+        """Expect the samples of a publisher, perhaps of events, twice: live, and from its cache.
 
         That holds beyond the publisher's end, because replies of its cache may still be on the way.
         """
-        self._publisher(gid).replays = True
+        publisher = self._publisher(gid)
+        publisher.replays, publisher.events = True, publisher.events or events
 
     def last(self, gid: bytes) -> int:
         """Return the sequence number of the latest sample of a publisher; 0 if there is none."""
@@ -195,7 +199,7 @@ class SampleDecoder:
                 return -1
             lost = missing
         else:
-            publisher.last = sequence
+            publisher.last, publisher.oldest = sequence, publisher.oldest or sequence
             if last and sequence > last:
                 lost = sequence - last - 1
         if lost:

@@ -370,9 +370,9 @@ class Subscription(Entity, Generic[M]):
         if self.message_type is None:
             self._announce(kind, decoder)
         if self._history.wanted and publisher.qos.latched:
-            decoder.expect_replay(gid(format_token(publisher)))
             # Samples with a lifespan, such as lines of /rosout, are events: late joiners skip them.
             lasting = publisher.qos.lifespan == FOREVER
+            decoder.expect_replay(gid(format_token(publisher)), events=not lasting)
             receive = partial(self._receive, decoder=decoder)
             history = _History(receive, self._history.start(lasting=lasting), lasting=lasting)
             self._request_history(publisher, publisher.qos.depth, history.take, history.finish)

@@ -15,11 +15,11 @@ from .shell import Shell
 
 def execute(goal: Any) -> None:
     """Count; a negative order waits to be cancelled."""
+    goal.feedback(Fibonacci.Feedback([goal.request.order]))
     if goal.request.order < 0:
         assert goal.wait_for_cancel(TIMEOUT)
         goal.canceled(Fibonacci.Result([-1]))
         return
-    goal.feedback(Fibonacci.Feedback([goal.request.order]))
     if goal.request.order == 13:
         goal.abort()
     else:
@@ -73,8 +73,12 @@ def test_send(shell: Shell) -> None:
 
 
 def test_send_with_feedback(shell: Shell) -> None:
-    out = shell("action", "send", "-f", "/robot/fib", "5").out
-    assert "feedback:\n  sequence: [5]\n---\n" in out
+    program = shell.start("action", "send", "-f", "/robot/fib", "-1")
+    program.wait_for("accepted")
+    program.wait_for("---")  # before its end, which may overtake feedback
+    assert "feedback:\n  sequence: [-1]\n---" in program.output
+    program.send(signal.SIGINT)
+    program.wait_for("goal canceled")
 
 
 @pytest.mark.parametrize(

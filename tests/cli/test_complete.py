@@ -216,7 +216,7 @@ def test_live_candidates_that_came_in_time(
 
     assert system.domain
     monkeypatch.setattr(Session, "live_tokens", wait_for_more)
-    monkeypatch.setenv("ROSZ_COMPLETION_TIMEOUT", "1.9")
+    monkeypatch.setenv("ROSZ_COMPLETION_TIMEOUT", "8")
     assert ask("rostopic echo /turt") == ["/turtle1/cmd_vel"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 
 import pytest
@@ -53,7 +54,7 @@ def test_services(example: Start) -> None:
     run = example("services", "rate:=20")
     run.wait_for("[client-2] waiting for service /add_two_ints")
     run.wait_for("7 + 7 = 14")
-    assert "7 + 7\n" in run.output  # the log of the server
+    run.wait_for(re.compile(r"7 \+ 7$"))  # the log of the server
     end(run)
 
 

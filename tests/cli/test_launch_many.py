@@ -15,10 +15,12 @@ from rosz.session import is_listening
 from .command import package
 from .launching import Start, runs, started
 
-INTERRUPTED_IMPORT = re.compile(
-    r"Exception ignored in: .*\nTraceback .*\n(  .*\n)*ResourceWarning: unclosed file .*\.pyc'>"
+INTERRUPTED = re.compile(
+    r"Exception ignored in: .*\nTraceback .*\n(  .*\n)*"
+    r"ResourceWarning: unclosed (file .*\.pyc'|<socket\.socket fd=\d+, family=1, .*)>"
 )
-"""What Python with all warnings says of an import that a signal ends."""
+"""What Python with all warnings says of a signal that ends an import, or that comes between the
+making of a socket, as of one that looks for the core, and the block that closes it."""
 
 TALKER = """#!/usr/bin/env python3
 import os
@@ -86,14 +88,15 @@ def test_a_launch_killed_as_its_core_comes_up_leaves_none(launch: Start, network
 
 def test_twenty_stubborn_nodes_end_in_time(launch: Start, network: Network) -> None:
     file = fleet(network.folder, STUBBORN, 20)
-    run = launch("--sigint-timeout", "0.5", "--sigterm-timeout", "0.5", file)
+    run = launch("--sigint-timeout", "0.5", "--sigterm-timeout", "3", file)
     run.wait_for(UP, times=20)
     begin = time.monotonic()
     run.send(signal.SIGINT)
     assert run.exit_code() == 0
-    assert time.monotonic() - begin >= 1
+    assert time.monotonic() - begin >= 3.5
     signals = re.findall(r"escalating to (SIG\w+)", run.output)
-    assert signals == ["SIGTERM"] * 20 + ["SIGKILL"] * 20  # all at the same time
+    # All at the same time, or as near to it as a busy machine is.
+    assert signals == ["SIGTERM"] * 20 + ["SIGKILL"] * 20
     assert run.output.count("did not end when asked to, and was killed") == 20
     assert not any(map(runs, started(run).values()))
 
@@ -108,6 +111,6 @@ def test_a_launch_ended_as_its_core_comes_up_leaves_none(
         eventually(lambda: is_listening(network.rendezvous), "the core")
         run.send(number)
         assert run.exit_code() in {0, 130}
-        assert "Traceback" not in INTERRUPTED_IMPORT.sub("", run.output)
+        assert "Traceback" not in INTERRUPTED.sub("", run.output)
         assert not is_listening(network.rendezvous)
         assert not any(map(runs, started(run).values()))

@@ -48,7 +48,16 @@ def site(network: Network) -> Site:
 
 @pytest.fixture(scope="module")
 def box(site: Site) -> Program:
+    """What tests only look at: they run in any order, on several workers."""
     return site.launch(BOX)
+
+
+@pytest.fixture
+def own_site() -> Iterator[Site]:
+    """A site of one test, which ends nodes."""
+    own = Network()
+    yield Site(own)
+    own.close()
 
 
 def _pid(program: Program, node: str, times: int = 1) -> int:
@@ -67,7 +76,7 @@ def test_each_node_has_its_own_name_arguments_and_parameters(box: Program) -> No
 
 def test_what_is_no_python_runs_as_a_process_of_its_own(box: Program) -> None:
     box.wait_for(
-        re.compile("WARNING: .*0.launch:.*node '/alone' .*'/box'.*not a Python script"), 60
+        re.compile(r"WARNING: .*\d\.launch:.*node '/alone' .*'/box'.*not a Python script"), 60
     )
     box.wait_for(re.compile(r"process\[alone-\d+\]: started"))
     box.wait_for(re.compile("cannot launch node of type .pk/gone.py.: package 'pk'"))
@@ -104,7 +113,8 @@ def test_the_status_shows_the_members(site: Site, box: Program) -> None:
     assert {"/deep/t1", "/l1", "/n1", "/t2", "/manager", "/load1"} <= set(listing.lines)
 
 
-def test_one_node_is_killed_and_the_others_stay(site: Site, box: Program) -> None:
+def test_one_node_is_killed_and_the_others_stay(own_site: Site) -> None:
+    site, box = own_site, own_site.launch(BOX)
     _pid(box, "/n1")
     assert site.rosz("node", "kill", "/n1").exit_code() == 0
     box.wait_for("end of /n1")
@@ -113,7 +123,9 @@ def test_one_node_is_killed_and_the_others_stay(site: Site, box: Program) -> Non
     late.wait_for("/late heard hello from /t2 of /t2")
 
 
-def test_a_container_that_is_killed_starts_again(box: Program) -> None:
+def test_a_container_that_is_killed_starts_again(own_site: Site) -> None:
+    box = own_site.launch(BOX)
+    _pid(box, "/deep/t1")
     os.kill(_pid(box, "/t2"), signal.SIGKILL)
     box.wait_for(re.compile(r"process of nodes /deep/t1, /l1, .* has died .*exit code -9"))
     box.wait_for(re.compile(r"\[box-1\] restarting process"))
@@ -156,7 +168,7 @@ def test_crashes_of_threads_and_in_c_name_the_program(site: Site) -> None:
     assert pair.exit_code() == -signal.SIGSEGV
     assert "ERROR: a thread of node 'pk/fatal.py' of container" in pair.output
     assert "has died: ValueError: broken in a thread" in pair.output
-    assert re.search(r'Segmentation fault\n(.*\n)*  File ".*fatal.py", line \d+', pair.output)
+    assert re.search(r'Segmentation fault(.*\n)+  File ".*fatal.py", line \d+', pair.output)
 
 
 def test_lines_of_one_program_are_not_mixed_with_errors_of_another(site: Site) -> None:

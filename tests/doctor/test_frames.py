@@ -53,7 +53,7 @@ def test_a_frame_with_two_parents(doctor: Doctor, network: Network, moving: bool
         else:
             StaticTransformBroadcaster(node).send(place(parent, "laser"))
     monitor = Monitor(network.node("watcher"))
-    finding = doctor(listen=1.0)["two-parents"]
+    finding = doctor(listen=3.0)["two-parents"]
     assert finding.level == "error"
     assert [line.partition(" (")[0] for line in finding.evidence] == [
         "laser is in base, says /robot",

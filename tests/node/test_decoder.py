@@ -76,6 +76,28 @@ def test_replays_and_live_samples_make_one_sequence(samples: str, messages: str,
     assert sum(one[1].lost for one in found if one and one[1]) == lost
 
 
+@pytest.mark.parametrize(
+    ("samples", "messages"),
+    [
+        ("3 4 r2 r3 r4 5", "3 4 2 5"),
+        ("3 r1 r2 r3 r1 r2 4", "3 1 2 4"),
+        ("r1 r2 3 r1 r2 r3 4", "1 2 3 4"),
+        ("3 r2 r4 r5 4 5 6", "3 2 4 5 6"),
+    ],
+)
+@pytest.mark.parametrize("told", [0, 1])
+def test_events_that_come_after_newer_ones_come_once(
+    samples: str, messages: str, told: int
+) -> None:
+    """A live sample may come before the publisher is known, and before what was kept."""
+    decoder = _decoder([])
+    live, *others = samples.split(" ", told)
+    found = _decode(decoder, live) if told else []
+    decoder.expect_replay(GID, events=True)
+    found += _decode(decoder, *others) if told else _decode(decoder, samples)
+    assert " ".join(one[0].decode() for one in found if one) == messages
+
+
 def test_a_replay_that_was_requested_of_another_publisher_comes_once() -> None:
     found = _decode(_decoder([]), "r3 r3 4 r4 5")
     assert " ".join(one[0].decode() for one in found if one) == "3 4 5"

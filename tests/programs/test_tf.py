@@ -118,7 +118,7 @@ def test_publishers_listeners_and_commands(network: Network) -> None:
     echo.wait_for("            in RPY (degree) [5.730, 0.000, 90.000]")
     command = start(network, "tf", "echo", "-n", "1", "map", "laser")
     assert command.exit_code() == 0, command.output
-    assert command.lines[1] == "- Translation: [1.000, 0.000, 0.500]"
+    assert "- Translation: [1.000, 0.000, 0.500]" in command.lines
 
     def tree() -> list[str]:
         command = start(network, "tf", "tree", "--wait", "0.5")
@@ -211,7 +211,7 @@ def test_buffer_server(network: Network) -> None:
     start(network, "run", "tf2_ros", "buffer_server")
     client = network.program(CLIENT)
     assert client.exit_code() == 0, client.output
-    assert client.lines[-1] == "4.0"
+    assert "4.0" in client.lines
 
 
 @pytest.mark.parametrize("program", [["tf_echo", "map", "base"], ["tf_monitor"]])

@@ -238,7 +238,8 @@ while len(selected) < 4:
     rospy.sleep(0.01)
 print("selected", selected)
 
-def passed(source, target, count):
+def passed(source, target, count, of=1, get=1):
+    # No queue overflows, however busy the machine is: of so many, so many must have come first.
     heard = []
     rospy.Subscriber(target, String, lambda message: heard.append(message.data), queue_size=100)
     publisher = rospy.Publisher(source, String, queue_size=100)
@@ -247,7 +248,8 @@ def passed(source, target, count):
         rospy.sleep(0.02)
     for number in range(count):
         publisher.publish(str(number))
-        rospy.sleep(0.005)
+        while sum(map(str.isdigit, heard)) < (number + 1) // of * get:
+            rospy.sleep(0.005)
     publisher.publish("end")
     publisher.publish("end")
     publisher.publish("end")
@@ -258,7 +260,7 @@ def passed(source, target, count):
 print("relayed", passed("n", "n_relay", 9))
 print("named", passed("n", "named", 9))
 print("muxed", passed("a", "out", 9))
-print("dropped", len(passed("n", "n_drop", 30)))
+print("dropped", len(passed("n", "n_drop", 30, 3, 2)))
 
 heard = []
 rospy.Subscriber("tripled", Float32, lambda message: heard.append(message.data))

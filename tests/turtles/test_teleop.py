@@ -76,7 +76,7 @@ class Terminal:
     def expect(self, text: str) -> None:
         """Read the screen until a text is on it."""
         while text not in self._text:
-            self._text += os.read(self.keyboard, 4096).decode()
+            self._text += os.read(self.keyboard, 4096).decode(errors="replace")
 
     @property
     def settings(self) -> list[int | list[bytes | int]]:

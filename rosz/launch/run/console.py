@@ -19,7 +19,7 @@ from rosz.worker import Worker
 
 _BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
 _CLOSE_TIMEOUT = 1.0
-_WRITE_TIMEOUT = 0.05
+_WRITE_TIMEOUT = 0.5
 """Time in seconds to wait for a text, so that later output of nodes comes after it."""
 _CAPACITY = 1024 * 1024
 """Number of waiting characters at which the writer is full."""

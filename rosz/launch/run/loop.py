@@ -68,10 +68,8 @@ class Loop:
     def post(self, action: Action) -> None:
         """Call a function soon; safe from any thread or signal handler, also after `close`."""
         self._posted.append(action)
-        try:
+        with suppress(OSError):  # full: the loop wakes anyway; closed: there is no loop to wake
             self._waker.send(b"\0")
-        except OSError:
-            return  # full: the loop wakes anyway; closed: there is no loop to wake
 
     def watch(self, fd: int, action: Action) -> None:
         """Call a function whenever a descriptor can be read."""
@@ -140,11 +138,9 @@ class Loop:
                 action()
 
     def _wake(self) -> None:
-        try:
+        with suppress(BlockingIOError):
             while self._woken.recv(4096):
                 pass
-        except BlockingIOError:
-            return
 
     def close(self) -> None:
         """Release the descriptors of the loop; a second call has no effect."""

@@ -39,7 +39,7 @@ from typing import Any
 
 CHUNK = 65536
 MAX_LINE = 65536
-PARTIAL_SECONDS = 0.05
+PARTIAL_SECONDS = 0.2
 """Time in seconds to wait for the rest of a line before its beginning is shown."""
 TAIL_LINES = 12
 TAIL_COLUMNS = 400
@@ -207,8 +207,7 @@ class OutputRelay:
         self._reply({"id": owner, "tail": list(self.tails.get(owner, ()))})
 
     def _answer(self, request: dict[str, Any]) -> None:
-        newest = self.newest.get(request["id"])
-        begin, data = (0, b"") if newest is None else newest.after(request["after"])
+        begin, data = self.newest.get(request["id"], Newest()).after(request["after"])
         text = base64.b64encode(data).decode()
         self._reply({"read": request["number"], "begin": begin, "data": text})
 
@@ -252,10 +251,11 @@ class OutputRelay:
                 tail.append(text[:TAIL_COLUMNS])
 
     def _write(self, sink: int, data: bytes) -> None:
-        view = memoryview(data)
-        while view and sink not in self.broken:
+        while data and sink not in self.broken:
+            # Whole lines that a pipe takes at once: the launch writes to it, too.
+            end = data.rfind(b"\n", 0, select.PIPE_BUF) + 1 or select.PIPE_BUF
             try:
-                view = view[os.write(sink, view) :]
+                data = data[os.write(sink, data[:end]) :]
             except BlockingIOError:
                 select.select([], [sink], [])
             except OSError:  # the terminal is closed; nodes run on without it

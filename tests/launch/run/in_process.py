@@ -54,9 +54,12 @@ class LaunchProcess:
         return bool(data)
 
     def finish(self) -> int:
-        """Read to the end, and return the exit code."""
+        """Read to the end, and return the exit code.
+
+        The end may come later than that of the launch: its relay writes, too.
+        """
         code = self.process.wait(TIMEOUT)
-        while select.select([self._reading], [], [], 1.0)[0] and self._read():
+        while select.select([self._reading], [], [], TIMEOUT)[0] and self._read():
             pass
         return code
 

@@ -11,11 +11,11 @@ import pytest
 from network import eventually, free_port
 
 from rosz.errors import LaunchError, NotFoundError
-from rosz.launch.run import Network, StatusClient
+from rosz.launch.run import Network, StatusClient, Timeouts
 from rosz.session import Query, Session, SessionConfig
 from rosz.wire import own_key
 
-from .in_thread import MemoryNetwork, alive, launch, program, shell
+from .in_thread import TIMEOUT, MemoryNetwork, alive, launch, program, shell
 
 DOMAIN = 3
 
@@ -49,6 +49,15 @@ SLEEPERS = [
 def test_status(tmp_path: Path, network: Network, client: StatusClient) -> None:
     with launch(tmp_path, *SLEEPERS, network=network) as run:
         run.err.wait_for("[space/b-2] process has died")
+        comm = Path(f"/proc/{run.pid('a-1')}/comm")
+
+        def has_changed() -> bool:
+            """Return whether it is another program, and past the instant without memory."""
+            return comm.read_text() == "sleep\n" and next(
+                status.nodes[0].memory > 0 for status in client.running().values()
+            )
+
+        eventually(has_changed, "the program of a")
         (status,) = client.running().values()
     assert (status.run_id, status.pid) == (run.runner.run_id, os.getpid())
     a, b, c = status.nodes
@@ -147,15 +156,17 @@ def test_requests_that_fail(tmp_path: Path, network: Network, client: StatusClie
 def test_a_launch_that_ends_refuses_requests(
     tmp_path: Path, network: Network, client: StatusClient
 ) -> None:
-    ready = tmp_path / "ready"
-    slow = shell("s", f"trap 'kill $!; sleep 0.7; exit 0' INT; touch {ready}; sleep 600 & wait")
-    with launch(tmp_path, slow, network=network) as run:
+    ready, asked = tmp_path / "ready", tmp_path / "asked"
+    end = f"kill $!; until test -e {asked}; do sleep 0.02; done; exit 0"
+    slow = shell("s", f"trap '{end}' INT; touch {ready}; sleep 600 & wait")
+    with launch(tmp_path, slow, network=network, timeouts=Timeouts(TIMEOUT, TIMEOUT)) as run:
         run.pid("s-1")
         eventually(ready.exists, "trap")
         run.runner.stop()
         run.out.wait_for("killing on exit")
         with pytest.raises(LaunchError, match="this launch is ending"):
             client.request("restart", "/s")
+        asked.touch()
         run.join()
 
 

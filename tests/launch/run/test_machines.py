@@ -20,7 +20,7 @@ from rosz.launch.run.machines import (
 )
 from rosz.launch.run.protocol import AgentWarning, LineReader, MessageWriter
 
-from .in_thread import HERE, shell
+from .in_thread import HERE, TIMEOUT, shell
 
 
 def machine(**settings: object) -> MachinePlan:
@@ -128,7 +128,7 @@ def test_a_blocked_pipe_blocks_nobody() -> None:
     assert writer.full
     writer.when_free(freed.set)
     lines, seen = LineReader(ours), []
-    reader = threading.Thread(target=writer.close, args=(10,))
+    reader = threading.Thread(target=writer.close, args=(TIMEOUT,))
     reader.start()
     while not lines.ended:
         seen += lines.read()

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import re
+import select
 import signal
+import socket
 import sys
 import time
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from network import eventually
+from network import Network, eventually
 
 from rosz.launch.run.output import RelayedOutput
+from rosz.launch.run.relay import OutputRelay
 
 from .in_process import launch_process
 from .in_thread import TIMEOUT, alive, launch, program, shell
@@ -84,6 +88,27 @@ def test_lines_of_two_nodes_are_never_mixed(tmp_path: Path) -> None:
         assert len(re.findall(rf"^{c * 40}\.$", run.text, re.MULTILINE)) == 200
 
 
+def test_words_of_the_launch_part_no_line(network: Network) -> None:
+    """Both write to one pipe; each write beyond what it takes at once can be parted."""
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, select.PIPE_BUF)
+    numbers, words = [str(number) for number in range(50_000)], ["word"] * 2000
+    ours, theirs = socket.socketpair()
+
+    def say() -> None:
+        for word in words:
+            os.write(writing, f"{word}\n".encode())
+
+    with ours, theirs, os.fdopen(reading) as file, os.fdopen(writing, "w"):
+        relay = OutputRelay(ours, "tag")
+        data = "".join(f"{number}\n" for number in numbers).encode()
+        network.thread(lambda: relay._write(writing, data))
+        network.thread(say)
+        lines = [file.readline().rstrip() for _ in numbers + words]
+        relay.selector.close()
+    assert [line for line in lines if line != "word"] == numbers
+
+
 def test_an_unfinished_line_is_shown(tmp_path: Path) -> None:
     node = shell("n", "printf 'password: '; exec sleep 600", output="screen")
     with launch_process(tmp_path, node) as run:
@@ -136,7 +161,9 @@ def test_python_writes_at_once_where_output_is_piped(tmp_path: Path) -> None:
 
 
 def test_output_is_shown_as_nodes_end_with_a_killed_launch(tmp_path: Path) -> None:
-    last = "trap 'seq 30000; echo over; exit 0' INT; echo up; while :; do sleep 0.05; done"
+    # What it starts as it ends is found and interrupted, too, if that is slow.
+    last = "trap 'trap \"\" INT; seq 30000; echo over; exit 0' INT; echo up"
+    last += "; while :; do sleep 0.05; done"
     with launch_process(tmp_path, shell("n", last, output="screen")) as run:
         run.expect("up\n")
         run.process.kill()
@@ -196,7 +223,10 @@ def test_a_relay_that_dies_at_once_is_given_up(
 def _relay_below(pid: int) -> int:
     """Return the relay that a process has started."""
     for entry in Path(f"/proc/{pid}/task").iterdir():
-        for child in (entry / "children").read_text().split():
+        children: list[str] = []
+        with suppress(OSError):  # the thread ended meanwhile
+            children = (entry / "children").read_text().split()
+        for child in children:
             with suppress(OSError):  # it ended meanwhile
                 if b"relay.py" in Path(f"/proc/{child}/cmdline").read_bytes():
                     return int(child)

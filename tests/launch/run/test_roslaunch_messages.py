@@ -132,7 +132,7 @@ def plain(output: list[str], folder: Path) -> list[str]:
     text = "\n".join([*output, ""]).partition("\nDIED\n")[0]
     text = re.sub(r"\x1b\[\d*m|\x1b\]2;.*?\x07", "", text)
     # roslaunch's threads and its nodes print into each other's lines.
-    text = re.sub(r"(?=\[[\w/]+-\d+\] (?:killing|escalating|process has))", "\n", text)
+    text = re.sub(r"(?=\[[\w/]+-\d+\] (?:killing|escalating|process has)|ERROR: )", "\n", text)
     text = re.sub(r"(process\[.*?\]: started with pid \[\d+\])", r"\n\1\n", text)
     text = re.sub(rf"{folder}/log/[0-9a-f-]+", "LOGS", text)
     text = re.sub(r"pid \[?\d+\]?", "pid PID", text)
@@ -144,8 +144,9 @@ def plain(output: list[str], folder: Path) -> list[str]:
 
 def test_all_ends_of_a_node(tmp_path: Path, packages: Path) -> None:
     (tmp_path / "test.launch").write_text(ALL_FATES)
-    timeouts = ("--sigint-timeout=0.3", "--sigterm-timeout=0.2")
-    options = '{"timeouts": {"sigint": 0.3, "sigterm": 0.2}}'
+    # Time enough for those that a signal ends.
+    timeouts = ("--sigint-timeout=2", "--sigterm-timeout=0.2")
+    options = '{"timeouts": {"sigint": 2, "sigterm": 0.2}}'
     said = []
     for command in (theirs(tmp_path, *timeouts), ours(tmp_path, packages, options)):
         with started(command, tmp_path, packages) as run:
