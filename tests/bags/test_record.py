@@ -240,7 +240,7 @@ def test_topics_that_appear_later(network: Network) -> None:
     with recording(network, "a.mcap", every=True) as made:
         for number in range(5):
             connect(node.publisher(f"/t{number}", String)).publish(String(data=str(number)))
-        made.wait_for_count(5)
+        eventually(lambda: all(made.count_of(f"/t{number}") for number in range(5)))
     with open_reader(made.files.done[0]) as reader:
         assert {f"/t{number}" for number in range(5)} <= {one.topic for one in reader.channels}
 
@@ -485,7 +485,8 @@ def test_a_full_disk(network: Network) -> None:
     if os.geteuid() or subprocess.run(mount, check=False, capture_output=True).returncode:
         pytest.skip("needs to mount a small disk, as root")
     try:
-        publisher = network.node("talker").publisher("/big", String, queue_size=1000)
+        # It waits for a full link, where another one would leave a message out.
+        publisher = network.node("talker").publisher("/big", String, qos=QoS(history="keep_all"))
         program = record(network, "/big", "-O", "disk/x.mcap")
         program.wait_for("Subscribing to /big")
         connect(publisher)
