@@ -49,8 +49,7 @@ class Ending(msgspec.Struct, eq=False):
         """Let another replica have the writes that nobody else has, if the replica ends."""
         if not self._call:
             return
-        deliveries = self._deliveries
-        unfit = self._asked | deliveries.lagging | deliveries.stopped
+        unfit = self._asked | self._deliveries.lagging | self._deliveries.stopped
         candidates = [member.zid for member in (*self._members.seeds(), *self._members.all())]
         zid = next((zid for zid in candidates if zid not in unfit), "")
         if self._store.disk.is_current or not self._unshared():
