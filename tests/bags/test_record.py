@@ -261,6 +261,7 @@ def test_a_publisher_is_one_channel_from_its_first_message_on(network: Network) 
         for number in range(3):
             with recording(network, f"{number}.mcap", *topics) as made:
                 made.wait_for_count(400)
+                eventually(lambda: all(map(made.count_of, topics)))
             with open_reader(made.files.done[0]) as reader:
                 found = [one for one in reader.channels if one.topic in topics]
             made.node.close()
