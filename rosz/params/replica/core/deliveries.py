@@ -246,7 +246,7 @@ class Deliveries:
 
     def share(self, number: int) -> None:
         """Note that another replica has all batches up to a number."""
-        self._unshared = {own: one for own, one in self._unshared.items() if own > number}
+        self._unshared = {own: sent for own, sent in self._unshared.items() if own > number}
 
     @property
     def unshared(self) -> list[tuple[Path, tuple[int, str]]]:

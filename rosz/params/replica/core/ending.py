@@ -79,7 +79,7 @@ class Ending(msgspec.Struct, eq=False):
         """Return the paths of own writes that only this replica has, and that none replaced."""
         source = self._store.history.source
         found = ((path, stamp, source(path)) for path, stamp in self._deliveries.unshared)
-        return [path for path, stamp, one in found if one and (one.time, one.clock) == stamp]
+        return [path for path, stamp, put in found if put and (put.time, put.clock) == stamp]
 
     def _leave(self) -> None:
         call, self._call = self._call, 0
