@@ -240,7 +240,7 @@ def test_topics_that_appear_later(network: Network) -> None:
     with recording(network, "a.mcap", every=True) as made:
         for number in range(5):
             connect(node.publisher(f"/t{number}", String)).publish(String(data=str(number)))
-        made.wait_for_count(5)
+        eventually(lambda: all(made.count_of(f"/t{number}") for number in range(5)))
     with open_reader(made.files.done[0]) as reader:
         assert {f"/t{number}" for number in range(5)} <= {one.topic for one in reader.channels}
 
@@ -261,6 +261,7 @@ def test_a_publisher_is_one_channel_from_its_first_message_on(network: Network) 
         for number in range(3):
             with recording(network, f"{number}.mcap", *topics) as made:
                 made.wait_for_count(400)
+                eventually(lambda: all(map(made.count_of, topics)))
             with open_reader(made.files.done[0]) as reader:
                 found = [one for one in reader.channels if one.topic in topics]
             made.node.close()
@@ -485,7 +486,8 @@ def test_a_full_disk(network: Network) -> None:
     if os.geteuid() or subprocess.run(mount, check=False, capture_output=True).returncode:
         pytest.skip("needs to mount a small disk, as root")
     try:
-        publisher = network.node("talker").publisher("/big", String, queue_size=1000)
+        # It waits for a full link, where another one would leave a message out.
+        publisher = network.node("talker").publisher("/big", String, qos=QoS(history="keep_all"))
         program = record(network, "/big", "-O", "disk/x.mcap")
         program.wait_for("Subscribing to /big")
         connect(publisher)

@@ -18,7 +18,7 @@ from rosz.node import Node
 
 from .command import ROSZ
 from .launching import Start
-from .shell import Shell, latch
+from .shell import Shell, latch, with_log
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def talker(network: Network) -> Node:
     pose = Pose(position=Point(1.5, -2.0, 0.25))
     latch(node, "/robot/pose", PoseStamped(header=Header(frame_id="map"), pose=pose))
     latch(node, "/robot/text", String("hello"))
-    return node
+    return with_log(node)
 
 
 @pytest.fixture

@@ -8,12 +8,12 @@ import sys
 from typing import Any
 
 import pytest
-from network import Network, Program
+from network import Network, Program, eventually
 
 from rosz.cli.main import run
 from rosz.node import Node
 
-__all__ = ("Result", "Shell", "latch")
+__all__ = ("Result", "Shell", "latch", "with_log")
 
 _MAIN = "from rosz.cli.main import main; main()"
 
@@ -99,3 +99,11 @@ class Shell:
 def latch(node: Node, topic: str, message: Any) -> None:
     """Publish a message that stays."""
     node.publisher(topic, type(message), latch=True).publish(message)
+
+
+def with_log(node: Node) -> Node:
+    """Return a node once it has its publisher of /rosout, which a thread opens."""
+    rosout = node.log._rosout
+    assert rosout is not None
+    eventually(lambda: rosout._publish, "the publisher of /rosout")
+    return node

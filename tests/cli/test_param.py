@@ -494,12 +494,10 @@ def test_a_writer_is_warned_of_silent_replicas(
     replica = network.replica()
     Mute(network)
     eventually(lambda: len(replica.members()) == 1)
-    assert param("set", "/a", "1") == (
-        0,
-        "",
-        "WARNING: written, but not yet known to mute program (pid 7 on elsewhere), "
-        "which did not answer\n",
-    )
+    text = "WARNING: written, but not yet known to mute program (pid 7 on elsewhere), "
+    told = 0, "", f"{text}which did not answer\n"
+    # On a busy machine the other replica does not answer in that time, either.
+    eventually(lambda: param("set", "/a", "1") == told, "the warning")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from rosz.msgs.geometry_msgs.msg import Twist
 from rosz.msgs.std_msgs.msg import Bool, String
 from rosz.node import Node
 
-from .shell import Shell, latch
+from .shell import Shell, latch, with_log
 
 pytestmark = pytest.mark.usefixtures("talker")
 
@@ -32,7 +32,7 @@ def test_sides(shell: Shell) -> None:
 
 
 def test_verbose(shell: Shell, network: Network) -> None:
-    network.node("other").subscription("/cmd_vel", Twist, lambda _: None)
+    with_log(network.node("other")).subscription("/cmd_vel", Twist, lambda _: None)
     assert shell("topic", "list", "-v").out == (
         "\nPublished topics:\n"
         " * /robot/pose [geometry_msgs/PoseStamped] 1 publisher\n"

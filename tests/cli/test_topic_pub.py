@@ -26,6 +26,7 @@ def heard(talker: Node) -> list[Twist]:
 def test_once(shell: Shell, heard: list[Twist]) -> None:
     result = shell("topic", "pub", "-1", "/cmd", "geometry_msgs/Twist", "{linear: {x: 2}}")
     assert result.out == "publishing and latching message for 3.0 seconds\n"
+    eventually(lambda: heard, "the message")  # the callback may be later than the command
     assert [message.linear.x for message in heard] == [2.0]
 
 

@@ -7,7 +7,7 @@ import pytest
 from rosz.errors import DecodeError, ParamError, PartlyWritten
 from rosz.params.replica.core import effects as done
 from rosz.params.replica.core import events as said
-from rosz.params.writes import Change
+from rosz.params.writes import DELETED, Change
 
 from .dialogue import WALL, Dialogue, batch, member, writer
 
@@ -315,6 +315,17 @@ def test_the_end_says_what_is_lost() -> None:
     talk.sleep(1.0)
     assert talk.only(done.Leave)
     assert "'/a' and 1 more is lost with this process" in talk.all(done.Log)[-1].text
+
+
+def test_what_another_replaced_is_not_lost_at_the_end() -> None:
+    talk, watch = writer()
+    talk.say(said.SeedCame(B), said.MemberCame(watch, B))  # who takes it unacknowledged
+    deletion = batch("first", DELETED, WALL + int(talk.seconds * 1e9) + 1)
+    talk.say(said.BatchReceived("bb", 1, deletion))
+    talk.say(said.SeedWent("bb"), said.MemberWent(watch, "bb"))
+    talk.say(said.CloseCalled(talk.call()))
+    assert talk.only(done.Leave)
+    assert not talk.all(done.Log)
 
 
 @pytest.mark.parametrize("others", [(), (B,)])

@@ -496,7 +496,11 @@ class MultiThreadedExecutor(Executor):
                     self._leave(group)
                 self.wake()
 
-        self._pool.submit(work)
+        try:
+            self._pool.submit(work)
+        except RuntimeError:
+            if not self._is_shutdown:  # by another thread, after the callback was found ready
+                raise
         self._raise_failure()
 
     def _next(self) -> Ready | None:

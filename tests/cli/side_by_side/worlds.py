@@ -28,6 +28,8 @@ _TIMEOUT = 200.0
 _MODULES = ("rosmaster", "rostopic", "rosservice", "rosnode", "rosmsg", "rosparam", "std_srvs.srv")
 _SOME = 3
 """Lines after which what goes on for ever has said enough."""
+_NOTHING = "no new messages"
+"""What is measured in a second in which a busy machine has linked nobody yet."""
 
 _PACKAGE = {
     "package.xml": (
@@ -168,12 +170,14 @@ def _beginning(program: Program) -> Outcome:
     """Return the first lines of what does not end by itself; end it then or at an error."""
     assert program.process.stdin is not None
     program.process.stdin.close()
-    program.wait_until(lambda: len(program.lines) >= _SOME or program.errors, _TIMEOUT)
+
+    def said() -> list[str]:
+        return [line for line in program.lines if line != _NOTHING][:_SOME]
+
+    program.wait_until(lambda: len(said()) == _SOME or program.errors, _TIMEOUT)
     program.send(signal.SIGINT)
     code = program.exit_code(_TIMEOUT)
-    out, err = (
-        "".join(f"{line}\n" for line in lines) for lines in (program.lines[:_SOME], program.errors)
-    )
+    out, err = ("".join(f"{line}\n" for line in lines) for lines in (said(), program.errors))
     return Outcome(code, out, err)
 
 

@@ -191,8 +191,9 @@ def test_log_messages_name_the_file_without_its_folder(printed: Printed) -> None
             rospy.loginfo("here")
         timer = rospy.Timer(rospy.Duration(0.1), say)
         found = rospy.wait_for_message("/rosout", Log, 60)
-        print(found.file == os.path.basename(__file__), found.function)
         timer.shutdown()
+        timer.join()  # its lines would come between the words of this one
+        print(found.file == os.path.basename(__file__), found.function)
         """)[-1:] == ["True say"]
 
 

@@ -208,6 +208,7 @@ def test_simulated_time(network: Network, printed: Printed) -> None:
         import threading, rospy
         from itertools import count, repeat
         from rosgraph_msgs.msg import Clock
+        from rosz.ros1.state import state
         rospy.init_node("simulated")
         ticks = rospy.Publisher("/clock", Clock, queue_size=1)
         print(rospy.rostime.is_wallclock(), rospy.get_time())
@@ -229,8 +230,10 @@ def test_simulated_time(network: Network, printed: Printed) -> None:
         rospy.Timer(rospy.Duration(2), lambda event: again.set(), oneshot=True)
         print(again.wait(60))
         def back():
+            while not state.node.clock._source.sleepers:
+                pause.wait(0.01)
             times[0] = repeat(1.0)
-        threading.Timer(1, back).start()
+        threading.Thread(target=back).start()
         show("back", lambda: rospy.sleep(1e6))
         print(rospy.get_time())
         """)

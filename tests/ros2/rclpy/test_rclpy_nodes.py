@@ -387,6 +387,24 @@ def test_several_threads(start: Start) -> None:
         context.shutdown()
 
 
+def test_an_executor_that_is_shut_down_while_it_finds_a_callback(world: World) -> None:
+    """The callback is not run, and nothing is raised on the thread that spins."""
+    calls: list[int] = []
+    executor = executors.MultiThreadedExecutor(2, context=world.context)
+
+    class Group(ReentrantCallbackGroup):
+        def enter(self) -> bool:
+            executor.shutdown()
+            return super().enter()
+
+    world.executor.remove_node(world.node)
+    executor.add_node(world.node)
+    group = Group()
+    world.node.create_timer(0.001, lambda: calls.append(1), callback_group=group)
+    executor.spin()
+    assert calls == []
+
+
 def test_exclusive_callback_groups(start: Start) -> None:
     context = start()
     node = Node("robot", context=context)

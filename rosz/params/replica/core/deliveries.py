@@ -91,7 +91,7 @@ class Deliveries:
         self._members = members
         self._open: dict[int, _OpenBatch] = {}
         self._lagging: set[str] = set()
-        self._unshared: dict[int, list[Path]] = {}
+        self._unshared: dict[int, tuple[list[Path], tuple[int, str]]] = {}
         self._told_alone = False
 
     def publish(self, call: WriteCalled, stamp: tuple[int, str]) -> int:
@@ -101,7 +101,7 @@ class Deliveries:
         now = self._work.now.seconds
         delivery = _OpenBatch(self.newest, call, batch, now)
         self._work.do(Publish(self.newest, batch, delivery.paths, bool(self._lagging)))
-        self._unshared[self.newest] = delivery.paths
+        self._unshared[self.newest] = delivery.paths, stamp
         if len(self._unshared) > _MAX_UNSHARED:
             del self._unshared[next(iter(self._unshared))]
         self._open[self.newest] = delivery
@@ -246,13 +246,12 @@ class Deliveries:
 
     def share(self, number: int) -> None:
         """Note that another replica has all batches up to a number."""
-        for shared in [shared for shared in self._unshared if shared <= number]:
-            del self._unshared[shared]
+        self._unshared = {own: sent for own, sent in self._unshared.items() if own > number}
 
     @property
-    def unshared(self) -> list[Path]:
-        """The paths of own batches that nobody else is known to have."""
-        return [path for paths in self._unshared.values() for path in paths]
+    def unshared(self) -> list[tuple[Path, tuple[int, str]]]:
+        """The paths and stamps of own batches that nobody else is known to have."""
+        return [(path, stamp) for paths, stamp in self._unshared.values() for path in paths]
 
     @property
     def lagging(self) -> frozenset[str]:

@@ -6,7 +6,7 @@ import logging
 
 import msgspec
 
-from rosz.params.paths import joined
+from rosz.params.paths import Path, joined
 from rosz.params.replica.core.calls import CALL, Calls
 from rosz.params.replica.core.comparisons import Compared, Comparisons
 from rosz.params.replica.core.deliveries import Deliveries
@@ -49,11 +49,10 @@ class Ending(msgspec.Struct, eq=False):
         """Let another replica have the writes that nobody else has, if the replica ends."""
         if not self._call:
             return
-        deliveries = self._deliveries
-        unfit = self._asked | deliveries.lagging | deliveries.stopped
+        unfit = self._asked | self._deliveries.lagging | self._deliveries.stopped
         candidates = [member.zid for member in (*self._members.seeds(), *self._members.all())]
         zid = next((zid for zid in candidates if zid not in unfit), "")
-        if self._store.disk.is_current or not deliveries.unshared:
+        if self._store.disk.is_current or not self._unshared():
             self._leave()
         elif zid:
             self._asked.add(zid)
@@ -68,7 +67,7 @@ class Ending(msgspec.Struct, eq=False):
 
     def on_acknowledged(self) -> None:
         """Handle an acknowledgement of an own batch."""
-        if self._call and not self._deliveries.unshared:
+        if self._call and not self._unshared():
             self._leave()
 
     def on_timer(self, number: int) -> None:
@@ -76,9 +75,15 @@ class Ending(msgspec.Struct, eq=False):
         if self._call == number:
             self._leave()
 
+    def _unshared(self) -> list[Path]:
+        """Return the paths of own writes that only this replica has, and that none replaced."""
+        source = self._store.history.source
+        found = ((path, stamp, source(path)) for path, stamp in self._deliveries.unshared)
+        return [path for path, stamp, put in found if put and (put.time, put.clock) == stamp]
+
     def _leave(self) -> None:
         call, self._call = self._call, 0
-        unshared, members = self._deliveries.unshared, self._members
+        unshared, members = self._unshared(), self._members
         # If all others have ended in the ordinary way, the store ends with the last one.
         unreached = members.zids or members.lost_all
         if unshared and unreached and not self._store.disk.is_current:
