@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TextIO
 
 from rosz.errors import ClosedError, UsageError, near_miss
+from rosz.names import printable
 from rosz.node.clock import Clock
 from rosz.worker import Worker
 
@@ -34,6 +35,8 @@ DEFAULT_FORMAT = "[${severity}] [${time}]: ${message}"
 _TOKEN = re.compile(r"\$\{(\w+)(?::([^}]*))?\}")
 _RESET = "\033[0m"
 _COLORS = {10: "\033[32m", 30: "\033[33m", 40: "\033[31m", 50: "\033[31m"}
+_CONTROLS = re.compile(r"\x1b(?!\[[\d;]*m)|\r(?!\n|\Z)|[\0-\x08\x0b\f\x0e-\x1a\x1c-\x1f\x7f-\x9f]")
+"""Control characters that do more to a terminal than lines and colours."""
 _SECOND = 1_000_000_000
 
 _Part = Callable[[logging.LogRecord, str], str]
@@ -149,7 +152,7 @@ class ConsoleHandler(LogHandler):
         stream: TextIO | None = sys.stdout if record.levelno < logging.WARNING else sys.stderr
         if stream is None or any(stream is broken for broken in self._broken):
             return
-        message = self.format(record)
+        message = _CONTROLS.sub(lambda found: printable(found[0]), self.format(record))
         text = "".join([part(record, message) for part in self._parts]) + "\n"
         color = _COLORS.get(severity(record.levelno)) if self._color else None
         try:

@@ -183,6 +183,19 @@ def test_tokens_in_a_message_stay(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == "[INFO] [1700000000.123456]: ${node} ${time:%H}\n"
 
 
+def test_controls_are_escaped_and_colours_are_not(capsys: pytest.CaptureFixture[str]) -> None:
+    """Texts may be from strangers, as those of messages and errors are."""
+    log = console(console_format="${message}")
+    log.info("\x1b[1;32mgreen\x1b[0m\ttab\nline\r\nend\r")
+    log.info("\x1b]0;title\x07\x1b[2J\x9b2J\x7f\rover")
+    log.report("failed", ValueError("\x1b[A"))
+    out, err = capsys.readouterr()
+    first, second = out.split("end\r\n")
+    assert first == "\x1b[1;32mgreen\x1b[0m\ttab\nline\r\n"
+    assert second.rstrip("\n") == r"\u001b]0;title\u0007\u001b[2J\u009b2J\u007f\u000dover"
+    assert err.endswith("ValueError: \\u001b[A\n")
+
+
 def test_thread_and_logger_of_a_child(capsys: pytest.CaptureFixture[str]) -> None:
     console(console_format="${logger} ${thread}").child("driver").info("x")
     assert capsys.readouterr().out == f"rosout.driver {threading.get_ident()}\n"

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from network import TIMEOUT, Network, free_port
+from network import TIMEOUT, WITHOUT_LIMITS, Network, free_port
 
 from rosz.errors import TransportError
 from rosz.session import Session, SessionConfig, first_listening
@@ -40,6 +40,26 @@ def test_an_unreachable_endpoint_does_not_delay_the_others(served: str) -> None:
     began = time.monotonic()
     assert first_listening([NOWHERE, served], 2 * TIMEOUT) == served
     assert time.monotonic() - began < TIMEOUT
+
+
+def test_a_silent_endpoint_does_not_delay_the_end(network: Network, served: str) -> None:
+    """A connection that nobody answers takes minutes."""
+    program = network.program(
+        f"""{WITHOUT_LIMITS}
+    import socket
+    from rosz.session import first_listening
+
+    server = socket.create_server(("127.0.0.1", 0), backlog=0)
+    waiting = [socket.socket() for _ in range(4)]  # more than it has room for
+    for other in waiting:
+        other.setblocking(False)
+        other.connect_ex(server.getsockname())
+    silent = f"tcp/127.0.0.1:{{server.getsockname()[1]}}"
+    print(first_listening([silent, "{served}"], {4 * TIMEOUT}))
+        """
+    )
+    assert program.wait_for("tcp") == served
+    assert program.exit_code() == 0
 
 
 def test_nobody_answers(refused: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
@@ -24,13 +25,22 @@ POLLING = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
 
 
 class Page:
-    """A server of the page, and the node that it shows."""
+    """A server of the page, which may need a password, and the node that it shows."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: Network, password: str) -> None:
         self.network = network
         self.node = network.node("robot")
-        self.server = network.run("-m", "rosz", "web", "--port", "0")
-        self.address = self.server.wait_for("the page is at", LONG).split()[-1]
+        self.password = password
+        word = network.folder / "word"
+        word.write_text(password)
+        options = ("--password-file", str(word)) if password else ()
+        self.server = network.run("-m", "rosz", "web", "--port", "0", *options)
+        line = self.server.wait_for("the page is at", LONG)
+        self.address = line.split()[-1]
+        self.cookie = ""
+        if password:
+            answer = self.send(request(urlsplit(self.address).netloc, f"GET /?token={password}"))
+            self.cookie = re.findall(r"(?i)set-cookie: ([^;]*)", answer.decode())[0]
 
     def send(self, data: bytes, *, wait: bool = True) -> bytes:
         """Send bytes on a connection of their own, and return the beginning of what comes back."""
@@ -43,7 +53,7 @@ class Page:
 
     def check(self) -> None:
         """Check that the server serves, has logged no traceback, and is not large."""
-        visitor = Visitor(self.address, "/graph")
+        visitor = Visitor(self.address, "/graph", cookie=self.cookie)
         visitor.should_see("/robot")
         visitor.close()
         assert "Traceback" not in self.server.output
@@ -52,19 +62,20 @@ class Page:
         assert int(rows["VmHWM"].split()[0]) << 10 < MOST_BYTES
 
 
-@pytest.fixture(scope="module")
-def page() -> Iterator[Page]:
+@pytest.fixture(scope="module", params=["", "secret"], ids=["open", "password"])
+def page(request: pytest.FixtureRequest) -> Iterator[Page]:
     pytest.importorskip("nicegui")
     network = Network()
     try:
-        yield Page(network)
+        yield Page(network, request.param)
     finally:
         network.close()
 
 
 def request(host: str, head: str, *more: str) -> bytes:
     """Return a request with a host and some lines."""
-    return "\r\n".join([f"{head} HTTP/1.1", f"Host: {host}", *more, "", ""]).encode()
+    lines = [f"{head} HTTP/1.1", f"Host: {host}", *more, "", ""]
+    return "\r\n".join(lines).encode(errors="surrogateescape")
 
 
 def test_requests_that_are_not_finished(page: Page) -> None:
@@ -100,11 +111,20 @@ def test_odd_requests(page: Page) -> None:
             "/3d?show=" + "[" * 1000,
             "/topics?topic=%00&topic=" + "x" * 8000,
             "*",
+            "/login?next=/%0d%0aX:%20y&next=//evil&token=%00&token=" + "x" * 1000,
+            "/login?next=%2f%5cevil.com&token=%ff",
         )
     ]
+    bodies = ("", "password=%00&password=%ff", "password=" + "x" * 9000, "\0" * 40, "&=&" * 9)
     for head in rng.sample(heads, 24):
-        data = request(host, head, "Connection: close", "Content-Length: 0")
-        assert b" 500 " not in page.send(data)[:20], head
+        body = rng.choice(bodies)
+        length = rng.choice((len(body), len(body), 0, 1 << 40, -1, "x"))
+        cookie = rng.choice(("", "rosz_web=é\udcff", "a=" + "b" * 3000, "=;;=", 'x="\\777'))
+        lines = [f"Content-Length: {length}", f"Cookie: {cookie}", "Connection: close"]
+        data = request(host, head, *lines) + body.encode()
+        answer = page.send(data, wait=length != 1 << 40)
+        assert b" 500 " not in answer[:20], head
+        assert not page.password or b" 200 " not in answer[:20], head
         damaged = bytearray(data)
         for _ in range(rng.randrange(1, 6)):
             damaged[rng.randrange(len(damaged))] = rng.randrange(256)
@@ -146,7 +166,7 @@ def test_frames_that_are_no_messages(page: Page) -> None:
     seed = rng.randrange(1 << 32)
     print("seed", seed)
     rng.seed(seed)
-    visitor = Visitor(page.address, "/topics")
+    visitor = Visitor(page.address, "/topics", cookie=page.cookie)
     for frame in frames(rng):
         if isinstance(frame, str):
             sent: str | bytes = frame.replace(CLIENT, visitor._client)
@@ -156,13 +176,13 @@ def test_frames_that_are_no_messages(page: Page) -> None:
             visitor.link.send(sent)
         except ConnectionClosed:
             visitor.close()
-            visitor = Visitor(page.address, "/topics")
+            visitor = Visitor(page.address, "/topics", cookie=page.cookie)
     visitor.close()
     page.check()
 
 
 def test_many_frames(page: Page) -> None:
-    visitor = Visitor(page.address, "/graph")
+    visitor = Visitor(page.address, "/graph", cookie=page.cookie)
     with suppress(ConnectionClosed):
         for number in range(5000):
             event = {"client_id": visitor._client, "id": number}

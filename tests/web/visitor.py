@@ -32,6 +32,7 @@ class Visitor:
         address: Address of the server.
         path: Path and query of the page.
         awake: Whether it reads what comes, and answers the pings of the server.
+        cookie: What the browser got when its user logged in.
 
     Attributes:
         first: What the server sent first, as HTML.
@@ -41,8 +42,11 @@ class Visitor:
         HTTPError: The server refuses.
     """
 
-    def __init__(self, address: str, path: str = "/", *, awake: bool = True) -> None:
-        with urllib.request.urlopen(address + path, timeout=_LONG) as response:
+    def __init__(
+        self, address: str, path: str = "/", *, awake: bool = True, cookie: str = ""
+    ) -> None:
+        request = urllib.request.Request(address + path, headers={"Cookie": cookie})
+        with urllib.request.urlopen(request, timeout=_LONG) as response:
             self.first: str = response.read().decode()
         text = self.first
         found, elements = _QUERY.search(text), _ELEMENTS.search(text)
@@ -56,7 +60,14 @@ class Visitor:
         place = address.replace("http", "ws", 1) + "/_nicegui_ws/socket.io/?" + urlencode(query)
         self._stack = ExitStack()
         self.link: ClientConnection = self._stack.enter_context(
-            connect(place, open_timeout=_LONG, max_size=None, ping_interval=None, close_timeout=1)
+            connect(
+                place,
+                additional_headers={"Cookie": cookie},
+                open_timeout=_LONG,
+                max_size=None,
+                ping_interval=None,
+                close_timeout=1,
+            )
         )
         self.link.send("40")
         self._events: SimpleQueue[str] = SimpleQueue()
