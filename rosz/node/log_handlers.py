@@ -152,7 +152,7 @@ class ConsoleHandler(LogHandler):
         stream: TextIO | None = sys.stdout if record.levelno < logging.WARNING else sys.stderr
         if stream is None or any(stream is broken for broken in self._broken):
             return
-        message = _CONTROLS.sub(lambda found: printable(found[0]), self.format(record))
+        message = _CONTROLS.sub(lambda match: printable(match[0]), self.format(record))
         text = "".join([part(record, message) for part in self._parts]) + "\n"
         color = _COLORS.get(severity(record.levelno)) if self._color else None
         try:
@@ -340,10 +340,8 @@ class FileHandler(LogHandler):
             self.path.unlink(missing_ok=True)
         for number in range(self._backups, 0, -1):
             source = self._numbered(number - 1)
-            try:
+            with suppress(FileNotFoundError):
                 source.replace(self._numbered(number))
-            except FileNotFoundError:
-                continue
 
     def _numbered(self, number: int) -> Path:
         return self.path.with_name(f"{self.path.name}.{number}") if number else self.path

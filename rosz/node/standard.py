@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from typing import Any
 
 from rosz.errors import ClosedError, NotFoundError, UsageError, YamlError
@@ -85,10 +86,8 @@ def serve_loggers(node: NodeCore) -> None:
 
 def _start(name: str, target: Any, node: NodeCore) -> None:
     def run() -> None:
-        try:
+        with suppress(ClosedError):  # a program that ends within its first moments
             target(node)
-        except ClosedError:
-            return  # a program that ends within its first moments
 
     start_thread(threading.Thread(target=run, name=name, daemon=True))
 

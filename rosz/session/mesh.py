@@ -14,6 +14,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -178,11 +179,9 @@ def serve_links(session: Session) -> Closable:
     key = links_key(session.zid)
 
     def reply(query: Query) -> None:
-        with query:
-            try:
-                query.reply(key, msgspec.msgpack.encode(session.peers()))
-            except RoszError:
-                return  # the session closed meanwhile, and the querier will notice
+        # If the session closes meanwhile, the querier notices that.
+        with query, suppress(RoszError):
+            query.reply(key, msgspec.msgpack.encode(session.peers()))
 
     return session.queryable(key, reply)
 

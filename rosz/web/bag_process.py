@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import IO
 
 import msgspec
@@ -54,11 +54,8 @@ class _PageChannel:
     def report(self, report: BagReport) -> None:
         """Write a line; a page that has gone needs none."""
         line = msgspec.json.encode(report) + b"\n"
-        with self._lock:
-            try:
-                self._reports.write(line)
-            except BrokenPipeError:
-                return
+        with self._lock, suppress(BrokenPipeError):
+            self._reports.write(line)
 
     def say(self, text: str) -> None:
         """Write a sentence."""

@@ -8,7 +8,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from network import TIMEOUT, Network, free_port
+from network import TIMEOUT, Network, eventually, free_port
 
 from rosz.session import Session, SessionConfig, mesh, opening
 from rosz.session.config import zenoh_settings
@@ -99,8 +99,10 @@ def test_a_newcomer_to_a_large_mesh(
     network: Network, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(mesh, "_MOST_PEERS", 2)
-    for name in ("one", "two"):
-        assert network.node(name).context.mesh.linked.wait(TIMEOUT)
+    monkeypatch.setattr(mesh, "_SILENT_SECONDS", TIMEOUT)  # the nodes of this test all reply
+    first, second = network.node("one").context, network.node("two").context
+    assert second.mesh.linked.wait(TIMEOUT)
+    eventually(lambda: first.session.peers() == [second.session.zid], "both are linked")
     assert "use a core" not in caplog.text
     assert network.node("three").context.mesh.linked.wait(TIMEOUT)
     assert "2 other sessions are here, each linked to all" in caplog.text

@@ -12,6 +12,7 @@ import select
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
@@ -103,10 +104,8 @@ class LaunchLog:
         """Close the file; a second call has no effect."""
         file, self._file = self._file, None
         if file is not None:
-            try:
+            with suppress(OSError):  # the disk is full: the lines that were not flushed are lost
                 file.close()
-            except OSError:  # the disk is full: the lines that were not flushed are lost
-                return
 
 
 class Console:

@@ -238,9 +238,8 @@ class Exchange:
             _log.debug("a write is not acknowledged: %s", error)
 
     def _on_sample_to_listener(self, sample: Sample) -> None:
-        message, key = sample.payload, sample.key
         # If the worker is busy, comparing finds the write.
-        self._runner.worker.offer(partial(self._receive, message, key))
+        self._runner.worker.offer(partial(self._receive, sample.payload, sample.key))
 
     def _receive(self, message: bytes, key: str) -> bool:
         """Apply a message; return whether it was a batch."""

@@ -78,8 +78,8 @@ class Ending(msgspec.Struct, eq=False):
     def _unshared(self) -> list[Path]:
         """Return the paths of own writes that only this replica has, and that none replaced."""
         source = self._store.history.source
-        found = ((path, stamp, source(path)) for path, stamp in self._deliveries.unshared)
-        return [path for path, stamp, put in found if put and (put.time, put.clock) == stamp]
+        writes = ((path, stamp, source(path)) for path, stamp in self._deliveries.unshared)
+        return [path for path, stamp, put in writes if put and (put.time, put.clock) == stamp]
 
     def _leave(self) -> None:
         call, self._call = self._call, 0
