@@ -103,7 +103,7 @@ def test_files_that_include_each_other(files: dict[str, str]) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(loader, "MAX_INCLUDED", 2000)
         patch.setattr(substitution, "_MOST_CHARACTERS", 100_000)
-        for faults in (None, []):
+        for faults in [None, list[LaunchFileError]()]:
             with suppress(LaunchFileError):
                 plan(["/0"], {}, FakeContext(files), faults=faults)
 
@@ -113,6 +113,6 @@ def test_includes_that_double() -> None:
     files = {f"/{n}": f"<launch>{include.format(n + 1) * 2}</launch>" for n in range(40)}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(loader, "MAX_INCLUDED", 2000)
-        for faults in (None, []):
+        for faults in [None, list[LaunchFileError]()]:
             with pytest.raises(LaunchFileError, match="included files have more than 2000 tags"):
                 plan(["/0"], {}, FakeContext({**files, "/40": "<launch/>"}), faults=faults)
