@@ -309,9 +309,7 @@ class _LaunchLoader:
             return self._document(path)
         except (OSError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
-            hint = ""
-            if path.endswith(".py"):
-                hint = "; launch files in Python are not read"
+            hint = "; launch files in Python are not read" if path.endswith(".py") else ""
             tag.fail(f"'{path}' cannot be read: {reason}{hint}", "file")
         except LaunchFileError as error:
             if path.endswith((".py", ".yaml", ".yml")):
