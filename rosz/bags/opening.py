@@ -166,11 +166,7 @@ def create_file(
     if kind == "rosbag2":
         raise UsageError(f"'{path}' is a folder; expected a name.mcap or a name.bag")
     return _writer_of(kind)(
-        path,
-        compression=compression,
-        replace=replace,
-        chunk_size=chunk_size,
-        checksums=checksums,
+        path, compression=compression, replace=replace, chunk_size=chunk_size, checksums=checksums
     )
 
 

@@ -341,13 +341,7 @@ class _Progress:
 
 
 @app.command("search")
-def search_command(
-    call: Call,
-    name: _Name,
-    namespace: _Space = "",
-    *,
-    json: Json = False,
-) -> int:
+def search_command(call: Call, name: _Name, namespace: _Space = "", *, json: Json = False) -> int:
     """Print the full name of a parameter, searched in a namespace and then in those above it."""
     with _client(call) as client:
         full = client.store.search(name, _resolve(call, namespace))

@@ -212,14 +212,7 @@ class SampleDecoder:
         if not self._with_info:
             return None
         return MessageInfo(
-            source_time,
-            time.time_ns(),
-            sequence,
-            gid,
-            lost,
-            self._type_name,
-            self._type_hash,
-            size,
+            source_time, time.time_ns(), sequence, gid, lost, self._type_name, self._type_hash, size
         )
 
     def _publisher(self, gid: bytes) -> _Publisher:

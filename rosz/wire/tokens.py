@@ -21,6 +21,7 @@ from typing import Literal, TypeVar
 import msgspec
 
 from rosz.errors import DecodeError
+from rosz.names import LONGEST_NAME
 from rosz.qos import FOREVER, QoS
 
 T = TypeVar("T")
@@ -202,8 +203,8 @@ def parse_token(key: str) -> Token:
         raise DecodeError(
             "liveliness token", 0, f"'{key}' has {len(chunks)} chunks, expected 9 or 13"
         )
-    if "" in chunks:
-        raise DecodeError("liveliness token", 0, f"'{key}' has an empty chunk")
+    if "" in chunks or "*" in key:
+        raise DecodeError("liveliness token", 0, f"'{key}' has an empty chunk, or a wildcard")
     _, domain, zid, node_id, entity_id, kind, enclave, namespace, node = chunks[:_NODE_CHUNKS]
     try:
         token = Token(
@@ -223,10 +224,12 @@ def parse_token(key: str) -> Token:
     if len(chunks) < _ENTITY_CHUNKS:
         raise DecodeError("liveliness token", 0, f"'{key}' has {len(chunks)} chunks, expected 13")
     name, type_text, type_hash, qos = chunks[_NODE_CHUNKS:_ENTITY_CHUNKS]
+    name = "/" + name.replace("%", "/").removeprefix("/")  # some leave the first slash out
+    if name.endswith("/") or "//" in name or len(name.encode()) > LONGEST_NAME:
+        raise DecodeError("liveliness token", 0, f"'{key}': no endpoint can have this name")
     return msgspec.structs.replace(
         token,
-        # Some participants leave the first slash out.
-        name="/" + name.replace("%", "/").removeprefix("/"),
+        name=name,
         type_name=ros_type(type_text),
         type_hash=type_hash,
         qos=parse_qos(qos),

@@ -109,6 +109,12 @@ ENTITIES = "".join(
             '<launch><include file="$(dirname)/a.launch"/></launch>',
             "includes nest deeper than 300",
         ),
+        (
+            "a.launch",
+            '<launch><arg name="x" default="ab"/><include file="$(dirname)/a.launch">'
+            '<arg name="x" value="$(arg x)$(arg x)"/></include></launch>',
+            "all values have more than 67108864 characters",
+        ),
     ],
 )
 def test_bombs(tmp_path: Path, name: str, text: str, message: str) -> None:

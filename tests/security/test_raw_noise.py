@@ -17,6 +17,8 @@ from rosz.wire import Kind, entity_key
 pytestmark = [pytest.mark.system]
 ROUNDS = 50
 OWN = ("param/gain", "param/a/%ff", "control", "x", "core/y")
+CHUNKS = ("%", "%%", "%a%", "*", "x" * 3000, "%00", "-1", "NN", "SS", "MP", ":1:,:,:,,", "é")
+"""What stands in damaged tokens."""
 ROBOT = """
     from rosz.msgs.example_interfaces.action import Fibonacci
     from rosz.msgs.std_msgs.msg import String
@@ -38,6 +40,13 @@ ROBOT = """
 """
 
 
+def damage(token: str, rng: random.Random) -> str:
+    chunks = token.split("/")
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        chunks[rng.randrange(2, len(chunks))] = rng.choice(CHUNKS)
+    return "/".join(chunks)
+
+
 def test_noise_of_a_stranger(network: Network) -> None:
     pytest.importorskip("nicegui")
     seed = int(os.environ.get("ROSZ_SEED", random.SystemRandom().randrange(1 << 32)))
@@ -56,7 +65,10 @@ def test_noise_of_a_stranger(network: Network) -> None:
     stranger = network.session()
     eventually(lambda: stranger.live_tokens("@ros2_lv/**", TIMEOUT), "the tokens")
     own = f"@rosz/{network.domain}"
+    sound = sorted(stranger.live_tokens("@ros2_lv/**", TIMEOUT))
+    damaged = [stranger.token(damage(rng.choice(sound), rng)) for _ in range(ROUNDS)]
     for _ in range(ROUNDS):
+        damaged.pop().close()
         view = take_survey(stranger, network.domain, looks=3).view
         keys = {
             entity_key(network.domain, token.name, token.type_name, token.type_hash)

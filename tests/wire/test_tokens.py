@@ -108,6 +108,15 @@ DAMAGED = {
     "@ros2_lv/0/a//0/NN/%/%/n": "has an empty chunk",
     "@ros2_lv/0/a/0/0/XX/%/%/n": "'XX' is not a valid Kind",
     "@ros2_lv/zero/a/0/0/NN/%/%/n": "invalid literal",
+    "@ros2_lv/0/*/0/0/NN/%/%/n": "or a wildcard",
+    "@ros2_lv/0/a/0/1/MP/%/%/n/**/s::msg::dds_::S_/h/::,1:,:,:,,": "or a wildcard",
+    **dict.fromkeys(
+        (
+            f"@ros2_lv/0/a/0/1/MP/%/%/n/{name}/s::msg::dds_::S_/h/::,1:,:,:,,"
+            for name in ("%", "%%", "%t%", "%t%%u", "é" * 512)
+        ),
+        "no endpoint can have this name",
+    ),
     "@ros2_lv/0/a/0/1/MP/%/%/n": "has 9 chunks, expected 13",
     "@ros2_lv/0/a/0/1/MP/%/%/n/%t/String/h/::,1:,:,:,,": "expected 'package::msg::dds_::Name_'",
     "@ros2_lv/0/a/0/1/MP/%/%/n/%t/s::msg::dds_::S_/h/1:1": "QoS chunk",

@@ -98,11 +98,7 @@ def recover(
 
 
 def rewrite(
-    path: Path,
-    compression: Compression | None,
-    *,
-    folder: Path | None = None,
-    force: bool = False,
+    path: Path, compression: Compression | None, *, folder: Path | None = None, force: bool = False
 ) -> Copied:
     """Replace a bag by a copy, and keep the old one as ``NAME.orig.SUFFIX``, as rosbag does.
 

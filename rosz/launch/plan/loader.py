@@ -32,6 +32,8 @@ from rosz.launch.plan.tag import Tag
 
 MAX_INCLUDES = 300
 """Maximum depth of includes, about that of roslaunch."""
+MAX_INCLUDED = 100_000
+"""Maximum number of tags in all included files, each counted as often as it is included."""
 
 _SHOWN_INCLUDES = 12
 
@@ -118,6 +120,7 @@ class _LaunchLoader:
         self._declared: set[str] = set()
         self._stack: list[_Frame] = []
         self._chain: tuple[tuple[str, str], ...] = ()
+        self._included = 0
 
     def finish(self, *, assign_machines: bool) -> Plan:
         used = self._declared | self._substitution.used
@@ -169,6 +172,11 @@ class _LaunchLoader:
                 if frame.leave is not None:
                     frame.leave()
                 continue
+            self._included += bool(frame.chain)
+            if self._included > MAX_INCLUDED:
+                reason = f"the included files have more than {MAX_INCLUDED} tags"
+                self._faults = None  # nothing else would end it
+                self._refuse(TagError(element, reason))
             try:
                 self._read(element, frame)
             except TagError as error:
@@ -301,9 +309,7 @@ class _LaunchLoader:
             return self._document(path)
         except (OSError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
-            hint = ""
-            if path.endswith(".py"):
-                hint = "; launch files in Python are not read"
+            hint = "; launch files in Python are not read" if path.endswith(".py") else ""
             tag.fail(f"'{path}' cannot be read: {reason}{hint}", "file")
         except LaunchFileError as error:
             if path.endswith((".py", ".yaml", ".yml")):

@@ -23,6 +23,8 @@ from rosz.launch.plan.scope import Scope
 _EVAL = "$(eval "
 _SUGGESTED = ("anon", "arg", "dirname", "env", "eval", "find", "optenv")
 _SUBSTITUTION = re.compile(r"\$\(([^$()]*)([$()])?")
+_MOST_CHARACTERS = 1 << 26
+"""Limit on what all substitutions of a plan bring together: args may double in each include."""
 _COMMANDS = ("anon", "arg", "dirname", "env", "find", "find-pkg-share", "optenv", "var")
 
 
@@ -90,6 +92,7 @@ class Substitution:
 
     def __init__(self, context: LaunchContext) -> None:
         self._context = context
+        self._left = _MOST_CHARACTERS
         self.used: set[str] = set()
 
     def __call__(self, text: str, scope: Scope) -> str:
@@ -101,14 +104,22 @@ class Substitution:
         if "$" not in text:
             return text
         if text.startswith(_EVAL) and text.endswith(")"):
-            return self._evaluate(text[len(_EVAL) : -1], scope)
+            value = self._evaluate(text[len(_EVAL) : -1], scope)
+            self._charge(len(value))
+            return value
         resolved = text
         for inner, index in _collect(text):
             command, words = _split(inner, index)
             if command not in {"find", "eval"}:
                 value = self._value(command, words, scope, index)
+                self._charge(resolved.count(f"$({inner})") * len(value), index)
                 resolved = resolved.replace(f"$({inner})", value)
         return self._find_all(resolved, text)
+
+    def _charge(self, size: int, index: int = 0) -> None:
+        self._left -= size
+        if self._left < 0:
+            raise TextError(f"all values have more than {_MOST_CHARACTERS} characters", index)
 
     def _value(self, command: str, words: list[str], scope: Scope, index: int) -> str:
         if command == "optenv":

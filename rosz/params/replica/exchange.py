@@ -319,11 +319,7 @@ class Exchange:
         done = partial(self._runner.worker.submit, ended)
         try:
             self._session.get_async(
-                key,
-                replies.append,
-                done,
-                payload=encode(effect.request),
-                timeout=effect.timeout,
+                key, replies.append, done, payload=encode(effect.request), timeout=effect.timeout
             )
         except RoszError:
             self._runner.worker.submit(

@@ -91,10 +91,7 @@ class Tokens:
             self._runner.run(events.MembersKnown(number))
 
         self._watch = self._session.watch_tokens(
-            self._keys.tokens,
-            partial(self._on_token, number),
-            on_complete,
-            many=True,
+            self._keys.tokens, partial(self._on_token, number), on_complete, many=True
         )
 
     def _unfollow_all(self, _: effects.UnfollowAll) -> None:

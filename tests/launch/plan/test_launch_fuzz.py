@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import random
+from contextlib import suppress
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rosz.errors import LaunchFileError
-from rosz.launch.plan import LaunchText, Plan, describe_args, plan
+from rosz.launch.plan import LaunchText, Plan, describe_args, loader, plan, substitution
 
 from .corpus import FILES, VALID
 from .fake_context import FakeContext
@@ -64,3 +66,53 @@ def test_any_value(text: str) -> None:
     if isinstance(found, LaunchFileError):
         assert found.line == 1
         assert 30 <= found.column <= len(body)
+
+
+CONDITIONS = [
+    "",
+    ' if="$(eval n &lt; 3)"',
+    ' if="$(eval n &lt; 40)"',
+    ' if="$(eval n &lt; 400)"',
+    ' unless="$(eval len(x) &lt; 99)"',
+    ' ns="$(arg x)"',
+    ' pass_all_args="true"',
+]
+VALUES = ["$(arg x)", "$(arg x)$(arg x)", "$(eval x * 2)", "$(dirname)", "$(anon x)", "x"]
+
+
+@st.composite
+def including(draw: st.DrawFn) -> dict[str, str]:
+    """Return the texts of files that include each other, under conditions, and pass args on."""
+    count = draw(st.integers(1, 5))
+    files: dict[str, str] = {}
+    for number in range(count):
+        text = '<arg name="x" default="x"/><arg name="n" default="0"/><param name="p" value="1"/>'
+        for _ in range(draw(st.integers(0, 3))):
+            to, condition = draw(st.integers(0, count - 1)), draw(st.sampled_from(CONDITIONS))
+            text += f'<include file="$(dirname)/{to}"{condition}>'
+            text += f'<arg name="x" value="{draw(st.sampled_from(VALUES))}"/>'
+            text += '<arg name="n" value="$(eval n + 1)"/></include>'
+        files[f"/{number}"] = f"<launch>{text}</launch>"
+    return files
+
+
+@given(files=including())
+@settings(max_examples=100)
+def test_files_that_include_each_other(files: dict[str, str]) -> None:
+    """Each ends, in a number of steps that is limited."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loader, "MAX_INCLUDED", 2000)
+        patch.setattr(substitution, "_MOST_CHARACTERS", 100_000)
+        for faults in [None, list[LaunchFileError]()]:
+            with suppress(LaunchFileError):
+                plan(["/0"], {}, FakeContext(files), faults=faults)
+
+
+def test_includes_that_double() -> None:
+    include = "<include file='/{}'/>"
+    files = {f"/{n}": f"<launch>{include.format(n + 1) * 2}</launch>" for n in range(40)}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loader, "MAX_INCLUDED", 2000)
+        for faults in [None, list[LaunchFileError]()]:
+            with pytest.raises(LaunchFileError, match="included files have more than 2000 tags"):
+                plan(["/0"], {}, FakeContext({**files, "/40": "<launch/>"}), faults=faults)
