@@ -9,6 +9,7 @@ import pytest
 from network import TIMEOUT, Network, eventually
 from web.visitor import Visitor
 
+from rosz.bags import Channel, McapWriter
 from rosz.introspect import take_survey
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.msgs.std_msgs.msg import String
@@ -55,10 +56,16 @@ def test_noise_of_a_stranger(network: Network) -> None:
     robot = network.program(ROBOT)
     robot.wait_for("up")
     bag = str(network.folder / "a")
+    with McapWriter(network.folder / "played.mcap") as writer:
+        channel = Channel("/played", "std_msgs/msg/String", definition="string data\n")
+        writer.write(writer.add(channel), 1, String("again").to_cdr())
+    played = str(network.folder / "played.mcap")
+    player = network.run("-m", "rosz", "bag", "play", "--loop", played)
     recorder = network.run("-m", "rosz", "bag", "record", "-a", "-O", bag)
     client = network.node("client").action_client("count", Fibonacci)
     client.wait_for_server()
     recorder.wait_for("/said")
+    recorder.wait_for("/played")
     page = network.run("-m", "rosz", "web", "--port", "0")
     address = page.wait_for("the page is at", 4 * TIMEOUT).split()[-1]
     visitors = [Visitor(address, path) for path in ("/actions", "/topics", "/console")]
@@ -91,6 +98,6 @@ def test_noise_of_a_stranger(network: Network) -> None:
     for visitor in visitors:
         visitor.close()
     Visitor(address, "/graph").close()
-    for program in (robot, recorder, page):
+    for program in (robot, player, recorder, page):
         assert program.process.poll() is None, program.output
         assert "Traceback" not in program.output

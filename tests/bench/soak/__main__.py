@@ -3,8 +3,8 @@
 A core and a node stay; nodes with sessions of their own come and go, one each second by default.
 A line a minute shows the memory of both (RSS), their threads and open files, and how many objects
 of Python the node holds. At the end stand what was added for each node that came and went, and the
-growth in the second half.
-``python -m tests.upstream.memory`` shows the share that is Zenoh's.
+growth in the second half. With ``--bare`` a router of Zenoh alone stands in the place of the core:
+its growth is the share of Zenoh. ``python -m tests.upstream.memory`` shows that of a peer.
 """
 
 from __future__ import annotations
@@ -96,13 +96,15 @@ def options() -> Namespace:
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=20.0)
     parser.add_argument("--per-second", type=float, default=1.0, help="nodes that come and go")
+    parser.add_argument("--bare", action="store_true", help="a router of Zenoh alone as core")
     parser.add_argument("--every", type=float, default=60.0, help="seconds between two lines")
     return parser.parse_args()
 
 
 def watch(given: Namespace, variables: dict[str, str]) -> list[Sight]:
     """Let nodes come and go, and print and return what was seen meanwhile."""
-    core = Part(["-m", "rosz", "core"], variables)
+    bare = [str(WORKER), "router", variables["ROSZ_RENDEZVOUS"]]
+    core = Part(bare if given.bare else ["-m", "rosz", "core"], variables)
     parts = [core]
     try:
         core.line()

@@ -1,15 +1,19 @@
-"""A part of the soak: ``worker.py stay`` or ``worker.py come PER_SECOND``; ends with its stdin.
+"""A part of the soak, which ends with its stdin.
 
-The one is a node that stays, and tells its memory when asked. The other makes nodes, each with a
-session of its own as if in another process, one after the other.
+``worker.py stay`` is a node that stays, and tells its memory when asked. ``worker.py come
+PER_SECOND`` makes nodes, each with a session of its own as if in another process, one after the
+other. ``worker.py router ENDPOINT`` is a router of Zenoh alone.
 """
 
 from __future__ import annotations
 
 import gc
+import json
 import sys
 import threading
 import time
+
+import zenoh
 
 import rosz
 from rosz.msgs.std_msgs.msg import String
@@ -54,5 +58,23 @@ def come(per_second: float) -> None:
         ended.wait(due - time.monotonic())
 
 
+def route(endpoint: str) -> None:
+    """Route what nodes send until the end of stdin."""
+    settings = {
+        "mode": "router",
+        "listen": {"endpoints": [endpoint]},
+        "scouting": {"multicast": {"enabled": False}},
+    }
+    with zenoh.open(zenoh.Config.from_json5(json.dumps(settings))):
+        print("ready", flush=True)
+        sys.stdin.read()
+
+
 if __name__ == "__main__":
-    stay() if sys.argv[1] == "stay" else come(float(sys.argv[2]))
+    match sys.argv[1]:
+        case "stay":
+            stay()
+        case "come":
+            come(float(sys.argv[2]))
+        case "router":
+            route(sys.argv[2])

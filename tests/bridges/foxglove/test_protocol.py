@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import struct
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from queue import SimpleQueue
@@ -223,6 +224,28 @@ def test_services(bridge: Bridge, client: Client) -> None:
     assert "SetBool" in call(3, b"cdr", b"")["message"]
     assert "expected cdr" in call(4, b"json", b"{}")["message"]
     assert call(5, b"cdr", b"", service + 1)["message"] == f"there is no service {service + 1}"
+
+
+def test_too_many_calls(network: Network) -> None:
+    go_on = threading.Event()
+
+    def wait(_request: Any) -> Any:
+        go_on.wait(TIMEOUT)
+        return True, "waited"
+
+    network.node("other").service("wait", SetBool, wait)
+    with bridge_on(network, limits=FoxgloveLimits(calls=2)) as bridge, bridge.client() as client:
+        service = client.service("/wait")["id"]
+        for number in range(3):
+            data = b"cdr" + SetBool.Request(data=True).to_cdr()
+            client.send_binary("BIII", 2, service, number, 3, data=data)
+        failure = client.wait(lambda one: not isinstance(one, bytes) and "callId" in one)
+        assert failure["callId"] == 2
+        assert failure["message"] == "this client has 2 calls, which is the limit"
+        go_on.set()
+        for _ in range(2):
+            client.wait(lambda one: isinstance(one, bytes) and one[0] == 3)
+        client.sync()
 
 
 def test_parameters(bridge: Bridge, client: Client) -> None:
