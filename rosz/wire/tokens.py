@@ -203,8 +203,9 @@ def parse_token(key: str) -> Token:
         raise DecodeError(
             "liveliness token", 0, f"'{key}' has {len(chunks)} chunks, expected 9 or 13"
         )
-    if "" in chunks or "*" in key:
-        raise DecodeError("liveliness token", 0, f"'{key}' has an empty chunk, or a wildcard")
+    if "" in chunks or not {"*", "\n"}.isdisjoint(key):
+        reason = "has an empty chunk, a line feed, or a wildcard"
+        raise DecodeError("liveliness token", 0, f"{key!r:.300} {reason}")
     _, domain, zid, node_id, entity_id, kind, enclave, namespace, node = chunks[:_NODE_CHUNKS]
     try:
         token = Token(

@@ -109,6 +109,7 @@ DAMAGED = {
     "@ros2_lv/0/a/0/0/XX/%/%/n": "'XX' is not a valid Kind",
     "@ros2_lv/zero/a/0/0/NN/%/%/n": "invalid literal",
     "@ros2_lv/0/*/0/0/NN/%/%/n": "or a wildcard",
+    "@ros2_lv/0/a/0/0/NN/%/%/n\n/other": r"n\\n.* a line feed",
     "@ros2_lv/0/a/0/1/MP/%/%/n/**/s::msg::dds_::S_/h/::,1:,:,:,,": "or a wildcard",
     **dict.fromkeys(
         (
