@@ -22,6 +22,14 @@ from rosz.node import Node
 
 from .city import City, Peer
 
+SERVICES = (
+    "describe_parameters",
+    "get_parameter_types",
+    "get_parameters",
+    "list_parameters",
+    "set_parameters",
+    "set_parameters_atomically",
+)
 EVENT = "rcl_interfaces/msg/ParameterEvent"
 DECLARED: dict[str, Any] = {
     "speed": 5,
@@ -45,6 +53,8 @@ def test_its_client(node: Node, peer: Peer) -> None:
     """All six services of a node of rosz, called by hiroz."""
     peer.do("listen", EVENT, "/parameter_events", "keepall")
     node.context.graph.wait_for_subscribers("/parameter_events", 1, TIMEOUT)
+    for service in SERVICES:  # its calls do not wait for a server
+        peer.wait_for_service(f"/robot/{service}")
 
     def ask(verb: str, given: object) -> Any:
         text = json.dumps(given, ensure_ascii=False, separators=(",", ":"))
