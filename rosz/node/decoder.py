@@ -62,7 +62,7 @@ Received = tuple[Any, MessageInfo | None]
 
 
 class _Publisher:
-    """The last sample and the first live one of a publisher; events count after newer ones, too."""
+    """The sequence numbers received from a publisher, for missing and repeated samples."""
 
     __slots__ = ("_before", "_late", "_replayed", "events", "last", "oldest", "replays")
 
@@ -78,6 +78,7 @@ class _Publisher:
         A replay comes on a way of its own, and may overtake live samples that wait to be decoded.
         """
         last, first, before = self.last, self._replayed, self._before
+        # A live sample may overtake an older event, which is new nevertheless; a value is outdated.
         if replayed and self.events and self._late < sequence < self.oldest:
             self._late = sequence
             return 0
@@ -137,9 +138,10 @@ class SampleDecoder:
         self._reported: set[str] = set()
 
     def expect_replay(self, gid: bytes, *, events: bool = False) -> None:
-        """Expect the samples of a publisher, perhaps of events, twice: live, and from its cache.
+        """Expect the samples of a publisher twice: live, and from its cache.
 
         That holds beyond the publisher's end, because replies of its cache may still be on the way.
+        ``events`` tells that each sample counts, and not only the newest value.
         """
         publisher = self._publisher(gid)
         publisher.replays, publisher.events = True, publisher.events or events

@@ -50,8 +50,8 @@ def leak_at_exit(thing: object) -> None:
 def wait_for_calls(timeout: float) -> bool:
     """Set `ENDING`, and wait until nothing is `OPEN`, and no other thread inside this package.
 
-    A thread with a function of it anywhere on its stack may be inside Zenoh, or return to it. One
-    of `probe` does neither, and may stay in a connection for minutes.
+    A thread with a function of it anywhere on its stack may be inside Zenoh, or return to it. The
+    threads of `probe` are not waited for: they use plain sockets, and may block for minutes.
 
     Args:
         timeout: Time limit in seconds.

@@ -219,6 +219,43 @@ def test_a_busy_one_rests_and_becomes_busy_again(
     assert handled.get(1) == [5]
 
 
+def test_samples_without_attachments_are_not_lost(
+    network: Network, handled: Handled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing tells them apart, so one that two subscribers have is handled twice."""
+    session = network.session()
+    made = session.publisher("a")
+    subscriber: Any = session.queue_subscriber("a", 64, handled)
+    seen: set[int] = set()
+
+    def publish(*numbers: int) -> None:
+        for number in numbers:
+            made.put(bytes([number]))
+
+    def handle(*numbers: int) -> None:
+        while not seen.issuperset(numbers):
+            seen.update(handled.get(1))
+
+    for turn in (0, 100):  # busy, at rest, and busy again
+        publish(turn, turn + 1)
+        handle(turn, turn + 1)
+        eventually(lambda: subscriber._idle, "a thread that waits for samples")
+        for _ in range(2):
+            subscriber.leave_channel_if_idle()
+        close = subscriber._channel.close
+
+        def publish_and_close(turn: int = turn, close: Callable[[], None] = close) -> None:
+            publish(turn + 2, turn + 3)
+            close()
+
+        monkeypatch.setattr(subscriber._channel, "close", publish_and_close)
+        with monkeypatch.context() as patch:
+            patch.setattr(declared, "_OFTEN_SECONDS", -1.0)
+            subscriber.leave_channel_if_idle()
+            handle(turn + 2, turn + 3)
+            eventually(lambda: subscriber._channel is None, "its rest")
+
+
 def test_one_whose_callback_takes_long_does_not_rest(network: Network, handled: Handled) -> None:
     session = network.session()
     publish = publisher_on(session, "a")

@@ -175,7 +175,7 @@ class _LaunchLoader:
             self._included += bool(frame.chain)
             if self._included > MAX_INCLUDED:
                 reason = f"the included files have more than {MAX_INCLUDED} tags"
-                self._faults = None  # nothing else would end it
+                self._faults = None  # so that this is raised: a list of faults would go on
                 self._refuse(TagError(element, reason))
             try:
                 self._read(element, frame)

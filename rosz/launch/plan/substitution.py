@@ -24,7 +24,7 @@ _EVAL = "$(eval "
 _SUGGESTED = ("anon", "arg", "dirname", "env", "eval", "find", "optenv")
 _SUBSTITUTION = re.compile(r"\$\(([^$()]*)([$()])?")
 _MOST_CHARACTERS = 1 << 26
-"""Limit on what all substitutions of a plan bring together: args may double in each include."""
+"""Most characters of all substituted values of a plan. Each include may double an arg."""
 _COMMANDS = ("anon", "arg", "dirname", "env", "find", "find-pkg-share", "optenv", "var")
 
 

@@ -68,7 +68,7 @@ class Loop:
     def post(self, action: Action) -> None:
         """Call a function soon; safe from any thread or signal handler, also after `close`."""
         self._posted.append(action)
-        with suppress(OSError):  # full: the loop wakes anyway; closed: there is no loop to wake
+        with suppress(OSError):  # a full socket wakes the loop anyway; a closed loop has ended
             self._waker.send(b"\0")
 
     def watch(self, fd: int, action: Action) -> None:

@@ -251,11 +251,13 @@ class OutputRelay:
                 tail.append(text[:TAIL_COLUMNS])
 
     def _write(self, sink: int, data: bytes) -> None:
-        while data and sink not in self.broken:
-            # Whole lines that a pipe takes at once: the launch writes to it, too.
-            end = data.rfind(b"\n", 0, select.PIPE_BUF) + 1 or select.PIPE_BUF
+        start = 0
+        while start < len(data) and sink not in self.broken:
+            # The launch writes to the same pipe. A write of at most PIPE_BUF bytes is not divided.
+            most = start + select.PIPE_BUF
+            end = data.rfind(b"\n", start, most) + 1 or most
             try:
-                data = data[os.write(sink, data[:end]) :]
+                start += os.write(sink, data[start:end])
             except BlockingIOError:
                 select.select([], [sink], [])
             except OSError:  # the terminal is closed; nodes run on without it

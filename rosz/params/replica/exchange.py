@@ -35,7 +35,7 @@ from rosz.worker import Worker
 _log = logging.getLogger("rosz.params")
 
 _LARGE: Final = 16_384
-"""Bytes of a message above which it is not applied on Zenoh's thread."""
+"""Bytes of a message above which the worker applies it, not the thread that receives it."""
 
 _ACK: Final = struct.Struct("<Q")
 _SEPARATOR: Final = b" "
@@ -217,7 +217,7 @@ class Exchange:
     # Batches of others
 
     def _on_change(self, sample: Sample) -> None:
-        """Apply a message on Zenoh's thread if that is quick, else on the worker."""
+        """Apply a message now if that is quick, else on the worker."""
         message = sample.payload
         try:
             reach = self._keys.change_reach(sample.key)
@@ -280,8 +280,8 @@ class Exchange:
         if effect.reason:
             ack += _SEPARATOR + effect.reason.encode()
         publisher = self._ack_publishers.get(effect.sender)
-        # On Zenoh's thread: an acknowledgement that waits for a full link would delay the
-        # samples that arrive. If it is lost, the writer sends the write again.
+        # On the thread that receives, an acknowledgement that waits for a full link would delay
+        # the next messages. If it is lost, the writer sends the write again.
         if publisher is not None:
             publisher.put(ack)
         else:

@@ -52,7 +52,7 @@ _CLOCK: Final = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 """The clock that counts the time in which the machine sleeps, where there is one."""
 
 _LOCK_TIMEOUT: Final = 0.002
-"""Seconds that a thread of Zenoh waits for the lock before it leaves an event to the worker."""
+"""Seconds that a thread that receives waits for the lock before the worker gets the event."""
 
 _MAX_DEFERRED: Final = 64
 """Largest number of deferred messages, which a read has to apply before it returns."""
@@ -132,7 +132,7 @@ class CoreRunner:
         storage: What keeps the writes, if anything does.
 
     Attributes:
-        worker: Worker for timers, and for events that no thread of Zenoh waits to handle.
+        worker: Worker for timers, and for events for which the lock was not soon free.
         watchers: Callbacks that are notified of changes.
         handlers: Function that carries out an effect after the step, for each type of them.
         on_own_change: Function called with changes that this process made.
