@@ -106,8 +106,9 @@ class JoinedParameters:
             self._worker.submit(partial(self._pass_on, name, changed))
 
     def _pass_on(self, name: str, changed: Changed) -> None:
-        if not self.active:
-            return
+        present = self._shared.context.params.lookup(split(changed.name))
+        if not self.active or not _same(present, MISSING if changed.new is None else changed.new):
+            return  # a newer change is told next; the master may have it already
         if changed.origin.startswith(BRIDGE):  # nothing crosses two bridges
             self._agree(name, DELETED if changed.new is None else changed.new)
         else:

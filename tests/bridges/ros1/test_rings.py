@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -33,6 +34,7 @@ class Place:
         self.heard: SimpleQueue[Any] = SimpleQueue()
         self.node.subscription("/said", String, self.heard.put, queue_size=100)
         self.all: list[str] = []
+        self.bridge: Any = None
 
     def join(self, other: Place) -> AttachedBridge:
         """Return a bridge of this network to the master of another one."""
@@ -57,7 +59,7 @@ def ring(request: pytest.FixtureRequest) -> Iterator[list[Place]]:
     with ExitStack() as stack:
         places = [Place(f"n{number}", stack) for number in range(request.param)]
         for number, place in enumerate(places):
-            stack.enter_context(place.join(places[number - 1]))
+            place.bridge = stack.enter_context(place.join(places[number - 1]))
         for number, place in enumerate(places):
             eventually(partial(_reaches, place, places[number - 1]))
         yield places
@@ -77,8 +79,26 @@ def test_nothing_goes_round(ring: list[Place]) -> None:
     first = ring[0]
     first.node.params["/round"] = 1
     eventually(lambda: all(place.node.params.get("/round", None) == 1 for place in ring))
+    # A value that is on its way to a master could overwrite the next one there.
+    eventually(lambda: all(place.bridge._params._agreed.get("round") == 1 for place in ring))
     ring[-1].node.params["/round"] = 2
     eventually(lambda: all(place.node.params.get("/round", None) == 2 for place in ring))
+
+
+@pytest.mark.parametrize("ring", [2], indirect=True)
+def test_a_late_bridge_does_not_take_back_a_change(ring: list[Place]) -> None:
+    first, second = ring
+    release, done = threading.Event(), threading.Event()
+    worker = first.bridge._params._worker
+    worker.submit(lambda: release.wait(TIMEOUT))
+    first.node.params["/late"] = 1
+    eventually(lambda: second.node.params.get("/late", None) == 1)  # by the other bridge
+    second.node.params["/late"] = 2
+    eventually(lambda: first.node.params.get("/late", None) == 2)
+    release.set()
+    worker.submit(done.set)
+    assert done.wait(TIMEOUT)
+    assert second.node.params["/late"] == 2
 
 
 def test_a_bridge_refuses_the_master_of_its_own_network(
