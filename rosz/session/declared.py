@@ -249,7 +249,8 @@ class QueueSubscriber:
     subscriber keeps its thread, and receives from a channel of Zenoh until no more come. Such a
     channel has a fixed capacity: a smaller one replaces it when fewer samples may wait. At each
     change a second subscriber is declared before the first is undeclared. The samples of the first
-    are handled first, and a sample that both have is handled once.
+    are handled first, and a sample that both have is handled once. Meanwhile the queue keeps all
+    samples, since the channel may get one late that a newer one would have replaced in the queue.
 
     Arguments are those of `Session.queue_subscriber`, and a function that declares a subscriber
     with a handler. One with a history is never busy: each declaration would replay the history.
@@ -329,9 +330,11 @@ class QueueSubscriber:
 
     def _use_channel(self) -> bool:
         """Receive from a new channel from now on; return whether it was declared."""
+        self._queue.depth = None
         try:
             new = PullSubscriber(self._key, self._declare(zenoh.handlers.RingChannel(self._depth)))
         except RoszError as error:
+            self._queue.depth = self._depth
             if not isinstance(error, ClosedError):
                 _log.warning("what comes often on '%s' is received slowly: %s", self._key, error)
             return False
@@ -343,8 +346,10 @@ class QueueSubscriber:
         else:
             taken = self._channel.take()
             self._channel.close()
-        self._waiting.extend(sample for sample in taken if sample.attachment not in before)
-        self._repeated = before | {sample.attachment for sample in self._waiting} - {None}
+        self._waiting.extend(
+            sample for sample in taken[-self._depth :] if sample.attachment not in before
+        )
+        self._repeated = before | {sample.attachment for sample in taken} - {None}
         self._unchecked = self._depth + len(self._repeated)
         self._channel = new
         if self._closed:  # meanwhile

@@ -604,6 +604,7 @@ def test_snapshots_are_of_the_last_seconds(network: Network) -> None:
     connect(publisher).publish(String(data="now"))
     program.wait_for("Subscribing to /chatter")
     client = node.client("/keeper/snapshot", Trigger)
+    client.wait_for_service(TIMEOUT)
 
     def saved() -> bool:
         response = client.call(TriggerRequest(), timeout=TIMEOUT)

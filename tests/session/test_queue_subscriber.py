@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from network import TIMEOUT, Network, eventually
+from zenoh.handlers import RingChannel
 
 from rosz import worker
 from rosz.bags.record.queue import Channels
@@ -119,6 +120,27 @@ def test_no_sample_is_lost_or_repeated(
     assert handled.get(4) == [3, 106, 107, 108]
     publish(4, SMALL)
     assert handled.get(1) == [4]
+
+
+def test_none_comes_after_a_newer_one(
+    network: Network, handled: Handled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The channel may get a sample when a newer one has replaced it in the queue already."""
+    session = network.session()
+    publish = publisher_on(session, "a")
+    subscriber: Any = session.queue_subscriber("a", 1, handled)
+    declare = subscriber._declare
+
+    def declare_and_publish(_: Any) -> Any:
+        made = declare(RingChannel(2))
+        publish(2, SMALL)
+        publish(3, SMALL)
+        return made
+
+    monkeypatch.setattr(subscriber, "_declare", declare_and_publish)
+    for numbers in ([0], [1, 3], [4]):
+        publish(numbers[0], SMALL)
+        assert handled.get(len(numbers)) == numbers
 
 
 def test_closed_in_its_own_callback(network: Network) -> None:
