@@ -30,7 +30,7 @@ from rosz.session.declared import (
     translate_errors,
 )
 from rosz.session.local_peers import LocalPeers, LocalRegistration, direct_endpoint
-from rosz.session.opening import open_raw
+from rosz.session.opening import open_raw, places_of
 from rosz.session.queries import (
     PRIORITIES,
     TARGETS,
@@ -51,6 +51,7 @@ from rosz.session.zenoh_workarounds import (
     close_links_at_once,
     remove_abandoned_segments,
 )
+from rosz.wire import Endpoint
 from rosz.worker import ENDING, lend_thread
 
 _CONGESTION = {True: zenoh.CongestionControl.BLOCK, False: zenoh.CongestionControl.DROP}
@@ -103,6 +104,7 @@ class Session(Closing):
         self._lifecycle = Lifecycle("the session", log=_log, on_fork=self._close_in_child)
         self._registration: LocalRegistration | None = None
         self._link_watch: Closable | None = None
+        self._ports: list[int] = []
         self._tokens: WeakValueDictionary[str, Declared] = WeakValueDictionary()
 
     @classmethod
@@ -137,6 +139,8 @@ class Session(Closing):
             registration.opened(str(raw.zid()))
         session = cls(raw, secured=config.keys is not None, rendezvous=config.rendezvous)
         session._registration, session.others = registration, others
+        ports = [Endpoint(end).port for ends in places_of(config) for end in ends]
+        session._ports = [*filter(None, ports), *([registration.peer.port] if registration else [])]
         if config.mode != "client" or config.reaches_beyond:
             session._link_watch = close_links_at_once(raw)
         return session
@@ -528,7 +532,8 @@ class Session(Closing):
         raw, self._raw = self._raw, ClosedSession("the session is closed")
         if self._registration is not None:
             self._registration.close()
-        with close_links(raw, self._rendezvous), translate_errors("close the session"):
+        links = close_links(raw, self._rendezvous, self._ports)
+        with links, translate_errors("close the session"):
             try:
                 raw.close()
             except zenoh.ZError as error:

@@ -21,8 +21,9 @@ What happens without them:
   long before any data came through it. Nothing is lost by not waiting: the system goes on sending.
 - `close_links`: Closing a session waits until the links that it is about to open have come about or
   failed, and until all that is queued for its links is sent. That takes ten seconds next to a
-  process that is stopped. Ending the connection below makes either fail at once. Data that the
-  system has accepted for the process is there when it resumes.
+  process that is stopped, and beside a connection on which the other end says nothing. Ending the
+  connection below makes either fail at once. Data that the system has accepted for a stopped
+  process is there when it resumes.
 - `remove_abandoned_segments`: Zenoh removes abandoned segments of shared memory only when a session
   with shared memory opens, so the memory of a process that was killed stays allocated until then.
 """
@@ -38,7 +39,7 @@ import stat
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from ipaddress import ip_address
@@ -83,6 +84,8 @@ _PAUSE = 0.02
 _OPEN_FILES: Final = Path("/dev/fd")
 _TCP: Final = re.compile(r"(?:tcp|tls)/([^%#?\]]+)(?:%\w+)?(\]?:\d+)")
 _NO_WAIT: Final = struct.pack("ii", 0, 0)
+_RECEIVED: Final = slice(128, 136)
+"""The place of tcpi_bytes_received in the struct tcp_info of Linux."""
 _GRACE_SECONDS: Final = 0.1
 _AGAIN_SECONDS: Final = 0.01
 """The pause between attempts: after one address of a process, Zenoh tries the next."""
@@ -205,10 +208,17 @@ def open_and_listen(settings: zenoh.Config, rendezvous: str, opened: Callable[[]
     return raw
 
 
-class _StoppedPeers:
-    """The stopped processes that a session may be linked to."""
+class _DelayingLinks:
+    """The connections of this process that lead to stopped processes, or to silent ones.
 
-    def __init__(self, raw: Any, peers: LocalPeers) -> None:
+    Args:
+        raw: The session of Zenoh.
+        peers: The sessions of this machine.
+        ports: The ports at which connections on which nothing has come count as well.
+    """
+
+    def __init__(self, raw: Any, peers: LocalPeers, ports: Collection[int]) -> None:
+        self._silent = ports
         meeting = Endpoint(peers.rendezvous)
         sessions = {peer.zid for peer in peers.stopped}
         links = [link for link in raw.info.links() if str(link.zid) in sessions]
@@ -222,7 +232,7 @@ class _StoppedPeers:
         self._ports -= {0, None}
 
     def change(self, change: Callable[[socket.socket], None]) -> None:
-        """Change all connections of this process to the stopped ones."""
+        """Change all these connections."""
         for connection, _, _ in _connections():
             with suppress(OSError):  # it has ended meanwhile
                 if self._is_other_end(connection):
@@ -235,11 +245,17 @@ class _StoppedPeers:
             # Private sockets are beside that of the rendezvous, and their names begin with its.
             ours = bool(self._path) and any(str(end).startswith(self._path) for end in ends)
             return ours and pid_of_peer(connection) in self._pids
-        return (
-            connection.family in {socket.AF_INET, socket.AF_INET6}
-            and there[1] in self._ports
-            and ip_address(there[0].partition("%")[0]).is_loopback
-        )
+        if connection.family not in {socket.AF_INET, socket.AF_INET6}:
+            return False
+        if there[1] in self._ports and ip_address(there[0].partition("%")[0]).is_loopback:
+            return True
+        used = {there[1], connection.getsockname()[1]}
+        return not used.isdisjoint(self._silent) and _has_received_nothing(connection)
+
+
+def _has_received_nothing(connection: socket.socket) -> bool:
+    state = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _RECEIVED.stop)
+    return len(state) == _RECEIVED.stop and not any(state[_RECEIVED])
 
 
 def close_links_at_once(raw: Any) -> Closable:
@@ -261,18 +277,25 @@ def _set_no_wait(event: Any) -> None:
 
 
 @contextmanager
-def close_links(raw: Any, rendezvous: str) -> Iterator[None]:
-    """Return a context in which links to stopped processes are closed if they delay its end."""
+def close_links(raw: Any, rendezvous: str, ports: Collection[int] = ()) -> Iterator[None]:
+    """Return a context in which links that delay its end are closed.
+
+    Args:
+        raw: The session of Zenoh.
+        rendezvous: The endpoint where the sessions of this machine meet; links to those that are
+            stopped delay the end.
+        ports: Ports at which also connections delay it on which nothing has come.
+    """
     peers = LocalPeers.read(rendezvous)
-    if not peers.stopped:
+    if not (peers.stopped or ports):
         yield
         return
-    stopped = _StoppedPeers(raw, peers)
-    stopped.change(lambda end: end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_WAIT))
+    links = _DelayingLinks(raw, peers, ports)
+    links.change(lambda end: end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_WAIT))
     over = threading.Event()
 
     def cut() -> None:
-        stopped.change(lambda end: end.shutdown(socket.SHUT_RDWR))
+        links.change(lambda end: end.shutdown(socket.SHUT_RDWR))
 
     def cut_repeatedly() -> None:
         pause = _GRACE_SECONDS

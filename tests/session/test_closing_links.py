@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+import msgspec
 import pytest
 from network import eventually, free_port
 
@@ -84,3 +85,22 @@ def test_a_link_lingers_by_itself(port: int) -> None:
     hub, leaf = settings(port, "127.0.0.1")
     with open_raw(hub, LocalPeers.read(hub.rendezvous)), Session.open(leaf):
         assert (port, True) in lingering()
+
+
+@pytest.mark.parametrize("dials", [True, False])
+def test_a_silent_other_end_delays_nothing(
+    port: int, caplog: pytest.LogCaptureFixture, *, dials: bool
+) -> None:
+    """Zenoh would give up after ten seconds, and a warning tells that."""
+    hub = SessionConfig(mode="router", rendezvous=f"tcp/127.0.0.1:{port}")
+    hour = "transport/unicast/open_timeout=3600000;transport/unicast/accept_timeout=3600000"
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        place = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+        config = msgspec.structs.replace(hub, connect=(place,) * dials, override=hour)
+        session = Session.open(config)
+        other = server.accept()[0] if dials else socket.create_connection(("127.0.0.1", port))
+        with other:
+            if not dials:
+                eventually(lambda: port in dict(lingering()), "that it is accepted")
+            session.close()
+    assert not caplog.records
