@@ -35,6 +35,7 @@ class Process(Program):
         file: str = "",
         more: int = 0,
         record: str = "",
+        slow: float = 0.0,
         root: Path = ROOT,
     ) -> None:
         settings = {
@@ -47,6 +48,8 @@ class Process(Program):
         }
         if record:
             settings["record"] = record
+        if slow:
+            settings["slow"] = slow
         script = str(root / "tests" / "params" / "member.py")
         super().__init__(
             [sys.executable, "-P", script, json.dumps(settings)],

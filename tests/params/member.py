@@ -1,7 +1,7 @@
 """One replica as a process of its own, told what to do line by line on stdin.
 
 Run as: python member.py '{"endpoint": …, "mode": …, "connect": […], "skew": …, "file": …,
-"more": …, "record": …}'
+"more": …, "record": …, "slow": …}'
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 from rosz.errors import PartlyWritten
 from rosz.params import DELETED, condense, normalise, split, spread
 from rosz.params.replica import Changed, Params, Replica
+from rosz.params.replica.core import events
 from rosz.params.replica.storage import Storage, StoreFile
 from rosz.session import (
     HybridClock,
@@ -66,6 +67,7 @@ class Member:
         file: str,
         more: int,
         record: str = "",
+        slow: float = 0.0,
     ) -> None:
         if record:
             sys.path.append(str(Path(__file__).parents[1]))
@@ -86,12 +88,26 @@ class Member:
             self._session, label=f"member {os.getpid()}", settled=settled, storage=storage
         )
         self.joined = time.perf_counter() - begun
+        if slow:
+            self._apply_slowly(slow)
         self._crowd = [
             Replica(Session.open(SessionConfig(rendezvous=endpoint, mode=mode)))
             for _ in range(more)
         ]
         self._delays: list[float] = []
         self._bare: list[Any] = []
+
+    def _apply_slowly(self, seconds: float) -> None:
+        """Take so long for each batch, as for a very large one."""
+        runner = self.replica._runner
+        step = runner._step
+
+        def step_slowly(event: events.Event) -> Any:
+            if isinstance(event, events.WriteCalled | events.BatchReceived):
+                time.sleep(seconds)
+            return step(event)
+
+        runner._step = step_slowly  # type: ignore[method-assign]
 
     def do(self, verb: str, **arguments: Any) -> Any:
         return getattr(self, f"do_{verb}")(**arguments)

@@ -15,8 +15,14 @@ from rosz.session import Session, SessionConfig
 
 from .fleet import Cable, Fleet, Process
 
-LIMIT = 2.0
+LIMIT = 4.0
 """Seconds without any sign of progress, which each process reports ten times in a second."""
+
+SLOW = 1.25 * LIMIT
+"""Seconds that each member takes to apply a batch."""
+
+HELD, LIMIT_BELOW = 4.0, 3.0
+"""Seconds for which a link takes nothing, below the five after which Zenoh closes it."""
 
 MEMBERS = 3
 
@@ -29,8 +35,19 @@ def fleet(tmp_path: Path) -> Iterator[Fleet]:
 
 
 @pytest.fixture
-def members(fleet: Fleet) -> dict[str, Process]:
-    processes = [*fleet.start_many(2), fleet.start(file=str(fleet.folder / "store"))]
+def slow() -> float:
+    return SLOW
+
+
+@pytest.fixture
+def limit() -> float:
+    return LIMIT
+
+
+@pytest.fixture
+def members(fleet: Fleet, slow: float) -> dict[str, Process]:
+    store = str(fleet.folder / "store")
+    processes = [*fleet.start_many(2, slow=slow), fleet.start(file=store, slow=slow)]
     return {f"member {process.pid}": process for process in processes}
 
 
@@ -43,10 +60,10 @@ def cable(fleet: Fleet, members: dict[str, Process]) -> Iterator[Cable]:
 
 
 @pytest.fixture
-def client(cable: Cable) -> Iterator[ParamClient]:
+def client(cable: Cable, limit: float) -> Iterator[ParamClient]:
     place = f"tcp/127.0.0.1:{cable.port}"
     with Session.open(SessionConfig(mode="client", rendezvous=place, must_connect=True)) as session:
-        yield ParamClient(session, timeout=LIMIT)
+        yield ParamClient(session, timeout=limit)
 
 
 def many(count: int) -> list[Change]:
@@ -65,16 +82,17 @@ def check_all_have_it(client: ParamClient, outcome: Outcome) -> None:
 
 def test_a_batch_that_is_applied_for_long(client: ParamClient) -> None:
     seen: list[int] = []
-    outcome = client.write(many(120_000), lambda holders, _: seen.append(holders))
+    outcome = client.write(many(20_000), lambda holders, _: seen.append(holders))
     check_all_have_it(client, outcome)
     assert len(seen) > 1
 
 
+@pytest.mark.parametrize(("slow", "limit"), [(0.0, LIMIT_BELOW)])
 def test_a_batch_that_is_sent_for_long(client: ParamClient, cable: Cable) -> None:
     cable.hold(after=1_000_000)
-    release = threading.Timer(2 * LIMIT, cable.release)
+    release = threading.Timer(HELD, cable.release)
     release.start()
-    outcome = client.write(large(40))
+    outcome = client.write(large(10))
     release.join()
     check_all_have_it(client, outcome)
 
@@ -89,7 +107,7 @@ def test_one_that_stops_in_the_midst_is_named(
             stopped.append(waiting[0])
             members[waiting[0]].stop()
 
-    outcome = client.write(many(30_000), stop_one)
+    outcome = client.write(many(20_000), stop_one)
     assert [label.removesuffix(" (stopped)") for label in outcome.slow] == stopped
     assert outcome.holders == MEMBERS - 1
 
@@ -106,6 +124,6 @@ def test_one_that_serves_and_stops_in_the_midst_is_named(
             members[server].stop()
 
     with pytest.raises(WaitTimeout) as raised:
-        client.write(many(30_000), stop_the_server)
+        client.write(many(20_000), stop_the_server)
     assert stopped[0] in str(raised.value)
     assert client.silent == stopped

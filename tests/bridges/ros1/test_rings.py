@@ -89,12 +89,13 @@ def test_nothing_goes_round(ring: list[Place]) -> None:
 def test_a_late_bridge_does_not_take_back_a_change(ring: list[Place]) -> None:
     first, second = ring
     release, done = threading.Event(), threading.Event()
-    worker = first.bridge._params._worker
+    bridged = first.bridge._params
+    worker, its_params = bridged._worker, bridged._shared.context.params
     worker.submit(lambda: release.wait(TIMEOUT))
     first.node.params["/late"] = 1
     eventually(lambda: second.node.params.get("/late", None) == 1)  # by the other bridge
     second.node.params["/late"] = 2
-    eventually(lambda: first.node.params.get("/late", None) == 2)
+    eventually(lambda: its_params.peek("/late") == 2)
     release.set()
     worker.submit(done.set)
     assert done.wait(TIMEOUT)
