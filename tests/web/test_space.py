@@ -197,6 +197,34 @@ return [first, color.getHexString()];
     assert world.messages() == []
 
 
+def test_a_view_that_does_not_change_is_not_drawn(world: World) -> None:
+    world.open("/3d?frame=map&show=grid")
+    eventually(lambda: drawn(world).get("lines", 0) > 0, "the grid")
+    counts = """
+const { renderer, scene, camera } =
+  getElement(Number(document.querySelector('.rosz-scene').id.slice(1)));
+let time = performance.now() + 1e6;
+performance.now = () => time;
+const draw = (change) => {
+  change();
+  const before = renderer.info.render.frame;
+  renderer.render(scene, camera);
+  return renderer.info.render.frame - before;
+};
+const found = [
+  () => window.dispatchEvent(new Event('rosz-drawn')),
+  () => { time += 500; },
+  () => { camera.position.x += 1; },
+  () => { time += 900; },
+  () => { time += 200; },
+].map(draw);
+delete performance.now;
+return found;
+"""
+    assert world.ask(counts) == [1, 0, 1, 0, 1]
+    assert world.messages() == []
+
+
 def test_a_texture_is_on_a_robot(world: World) -> None:
     world.network.node("painter").params.set("/painted", _PAINTED)
     world.open("/3d?frame=map&show=robot:/painted")

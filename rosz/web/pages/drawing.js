@@ -32,11 +32,16 @@ function textureOf(url, upright) {
   return loaded.get(key);
 }
 
+function drawn() {
+  window.dispatchEvent(new Event("rosz-drawn")); // backdrop.js draws the view
+}
+
 function show(material, url, upright) {
   if (!url) return;
   textureOf(url, upright).then((texture) => {
     material.map = texture;
     material.needsUpdate = true;
+    drawn();
   });
 }
 
@@ -93,6 +98,7 @@ export default class Drawing {
       this.mesh.remove(one);
     }
     for (const one of added) this.mesh.add(one);
+    drawn();
   }
 
   geometry(part, take) {
@@ -177,6 +183,7 @@ export default class Drawing {
         if (one.isMesh) one.material = color ? this.painted(color, part.texture) : this.plain(one.material);
       });
       found.add(object);
+      drawn();
     });
     return found;
   }

@@ -77,7 +77,7 @@ _VIEWS = {"orbit": "From the side", "top": "From above"}
 
 
 class _Backdrop(Object3D, component=Path(__file__).with_name("backdrop.js")):
-    """Gives the view the color of the page."""
+    """Gives the view the color of the page, and draws it only while it changes."""
 
 
 class _Drawn(Object3D, component=Path(__file__).with_name("drawing.js")):
@@ -123,7 +123,7 @@ class ScenePage:
                     .classes("rosz-card w-full overflow-hidden rosz-scene")
                 )
                 with self._scene:
-                    _Backdrop()
+                    _Backdrop(self._scene.id)
                 self._list = ui.column().classes("w-full gap-2 min-w-0")
         self._pointing.add_pointer(self._scene)
         Handling(self._scene, self._handles)
