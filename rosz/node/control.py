@@ -19,7 +19,7 @@ from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
 from rosz.node.standard import follow_clock
 from rosz.session import Query
-from rosz.wire import ProcessToken, nodes_key, own_key, parse_token
+from rosz.wire import ProcessToken, format_process, nodes_key, own_key, parse_token
 from rosz.worker import Worker, start_thread
 
 _log = logging.getLogger("rosz.control")
@@ -89,9 +89,7 @@ def serve_control(node: NodeCore) -> None:
         if reason and ending.acquire(blocking=False):
             # Hooks of the program may take their time, and more requests may come meanwhile.
             name = f"rosz-shutdown{node.name}"
-            start_thread(
-                threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True)
-            )
+            start_thread(threading.Thread(None, node.shutdown, name, (reason,), daemon=True))
 
     worker = node.keep(Worker[Query](f"rosz-control{node.name}", serve, threads=_THREADS))
     node.keep(context.session.queryable(key, worker.submit))
@@ -185,6 +183,8 @@ def _is_newer(node: NodeCore, other: ProcessToken) -> bool:
     asked = time.monotonic()
     try:
         replies = node.context.session.get(key, payload=request, timeout=_REPLY_TIMEOUT)
+        if not (replies or node.context.session.live_tokens(format_process(other), _REPLY_TIMEOUT)):
+            return False  # it has ended, perhaps as it found this one newer
         infos = [msgspec.msgpack.decode(r.payload, type=NodeInfo) for r in replies if r.ok]
     except (RoszError, msgspec.DecodeError):
         infos = []

@@ -708,7 +708,7 @@ def test_what_was_published_before_is_recorded_only_if_it_was_latched(network: N
     node.log.flush()
     with recording(network, "a.mcap", every=True) as made:
         eventually(lambda: made.count_of("/map") and made.count_of("/held"))
-        eventually(lambda: "/rosout" in made.recorder.topics)
+        node.context.graph.wait_for_subscribers("/rosout", 1, TIMEOUT)
         node.log.info("meanwhile")
         eventually(lambda: made.count_of("/rosout"))
         late = network.node("late")

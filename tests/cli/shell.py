@@ -5,16 +5,21 @@ from __future__ import annotations
 import io
 import json
 import sys
+from functools import partial
 from typing import Any
 
 import pytest
-from network import Network, Program, eventually
+from network import TIMEOUT, Network, Program, eventually
 
 from rosz.cli.main import run
 from rosz.node import Node
+from rosz.session import Session, SessionConfig
 
 __all__ = ("Result", "Shell", "latch", "with_log")
 
+_SPACE = "@ros2_lv/"
+_SEVERAL = 2
+"""Sessions from which on a command may be at one that does not know all tokens yet."""
 _MAIN = "from rosz.cli.main import main; main()"
 
 
@@ -67,6 +72,7 @@ class Shell:
         capsys: pytest.CaptureFixture[str],
     ) -> None:
         self.network = network
+        self._seen: set[str] = set()
         self._monkeypatch = monkeypatch
         self._capsys = capsys
         for name in ("ROS_NAMESPACE", "ROSZ_CONNECT", "ROSZ_LISTEN", "ROSZ_MODE", "NO_COLOR"):
@@ -85,11 +91,28 @@ class Shell:
             stdin: What it reads.
             terminal: Whether a person types that.
         """
+        self._await_tokens()
         self._monkeypatch.setattr(sys, "stdin", _Input(stdin, terminal=terminal))
         self._capsys.readouterr()
         code = run(words)
         out, err = self._capsys.readouterr()
         return Result(code, out, err)
+
+    def _await_tokens(self) -> None:
+        """Wait until a command sees what sessions of the test have declared.
+
+        It asks the session at the meeting point, to which others may have told it only just now.
+        """
+        found = (getattr(one, "session", one) for one in self.network._open)
+        sessions = [one for one in found if isinstance(one, Session) and not one.closed]
+        tokens = [(key, token) for one in sessions for key, token in one._tokens.items()]
+        wanted = {key for key, token in tokens if key.startswith(_SPACE) and not token.closed}
+        if len(sessions) < _SEVERAL or wanted <= self._seen:
+            return
+        with Session.open(SessionConfig.command(self.network.environment())) as command:
+            seen = partial(command.live_tokens, f"{_SPACE}**", TIMEOUT)
+            eventually(lambda: wanted <= {*seen()}, "the tokens of the test")
+        self._seen = wanted
 
     def start(self, *words: str, **variables: str) -> Program:
         """Start a command as a process of its own."""

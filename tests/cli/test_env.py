@@ -11,7 +11,7 @@ from network import Network
 from rosz.cli import env
 from rosz.cli.env import ALIASES
 
-from .shell import Shell
+from .shell import Shell, with_log
 
 BIN = Path(env.__file__).parent / "bin"
 ENV = f"{sys.executable} -P -m rosz env"
@@ -58,7 +58,7 @@ def test_rosparam_is_the_same_by_every_route(network: Network) -> None:
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_ros_1_names_mean_rosz(network: Network, shell: str) -> None:
-    network.node("talker")
+    with_log(network.node("talker"))
     done = evaluate(
         network,
         shell,

@@ -100,6 +100,7 @@ def test_a_node_can_be_restarted_from_another_terminal(launch: Start, network: N
     assert rosz(network, "launch", "--restart", "/publisher").returncode == 0
     run.wait_for("[publisher-1] restart requested")
     eventually(lambda: heard(run) != sorted(heard(run)), "a count from the beginning")
+    run.wait_for("process[publisher-1]: started", times=2)  # which another process writes
     after = started(run)
     assert after["publisher"] != before["publisher"]
     assert after["listeners/subscriber"] == before["listeners/subscriber"]

@@ -97,6 +97,17 @@ def test_age_counts_and_not_the_clock(network: Network, monkeypatch: pytest.Monk
     assert not new.is_shutdown
 
 
+def test_a_newer_node_does_not_follow_the_older_into_its_end(network: Network) -> None:
+    """The clock of its machine is behind, and the older one, which has ended, does not respond."""
+    king, elsewhere = network.node("king"), network.session()
+    later = king.process.started + 3600 * 10**9
+    old = ProcessToken(king.context.domain, elsewhere.zid, 1, later, 7, "afar", "/king")
+    assert not control._is_newer(king, old)
+    token = elsewhere.token(format_process(old))
+    eventually(lambda: king.is_shutdown, "the end, as the time in the token of the other counts")
+    token.close()
+
+
 def test_a_chain_of_successors(network: Network) -> None:
     kings = [network.node("king") for _ in range(5)]
     eventually(lambda: [k.is_shutdown for k in kings] == [True] * 4 + [False], "one is left")

@@ -13,7 +13,7 @@ from rosz.params.replica import Outcome, ParamClient
 from rosz.params.writes import Change
 from rosz.session import Session, SessionConfig
 
-from .fleet import Cable, Fleet, Process
+from .fleet import Cable, Fleet, Process, until_known
 
 LIMIT = 4.0
 """Seconds without any sign of progress, which each process reports ten times in a second."""
@@ -48,6 +48,7 @@ def limit() -> float:
 def members(fleet: Fleet, slow: float) -> dict[str, Process]:
     store = str(fleet.folder / "store")
     processes = [*fleet.start_many(2, slow=slow), fleet.start(file=store, slow=slow)]
+    until_known(processes)
     return {f"member {process.pid}": process for process in processes}
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -135,6 +136,19 @@ def test_a_storage_that_comes_late_or_is_wrong_is_put_right(network: Network) ->
     eventually(lambda: len(storage.held) == 4)
     replica._parameter_keys.reconcile()
     eventually(lambda: held(storage) == {"@rosz/0/param/a/b": 1, "@rosz/0/param/a/c": 2})
+
+
+def test_the_session_may_close_while_a_storage_is_put_right(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replica = network.replica()
+    replica.set("/a", 1)
+    tasks: list[Callable[[], object]] = []
+    monkeypatch.setattr("rosz.params.replica.replica.lend_thread", tasks.append)
+    network.keep(Storage(network.session()))
+    eventually(lambda: tasks, "its comparison with the tree")
+    replica._session.close()
+    tasks[0]()
 
 
 @settings(max_examples=15)

@@ -50,6 +50,8 @@ class Scene:
         self.user = network.node("user")
         self.simulator = Simulator(self.sim)
         wait_for_turtle(self.user, "/turtle1")
+        for name in ("clear", "kill", "reset", "spawn"):  # which come after those of the turtle
+            self.user.context.graph.wait_for_service(f"/{name}", TIMEOUT)
 
     def call(self, name: str, service_type: Any, *values: Any) -> Any:
         """Call a service from the other node."""

@@ -14,11 +14,11 @@ import sys
 import threading
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Final
 
-from rosz.errors import NoReplica, ParamError, RoszError
+from rosz.errors import ClosedError, NoReplica, ParamError, RoszError
 from rosz.lifecycle import Closing, Lifecycle
 from rosz.params.paths import Path, joined, to_path
 from rosz.params.replica.core import Config, ReplicaCore
@@ -42,7 +42,7 @@ from rosz.params.values import normalise
 from rosz.params.wire import Departure, Keys, Record, ReplicaMember, SyncReply, decode, encode
 from rosz.params.writes import DELETED, Change
 from rosz.session import Session, Stamp, clamp_timeout
-from rosz.worker import lend_thread, start_thread
+from rosz.worker import lend_thread
 
 if TYPE_CHECKING:
     from rosz.params.replica.storage import Storage
@@ -321,9 +321,11 @@ class Replica(_Copy):
             self._reconcile_at = now
         elif now >= self._reconcile_at and self._runner.core.is_oldest_seed:
             self._reconcile_at = now + _RECONCILE_EVERY
-            # This waits for replies, which the worker must not.
-            target = self._parameter_keys.reconcile
-            start_thread(threading.Thread(target=target, name="rosz-params-mirror", daemon=True))
+            lend_thread(self._reconcile)  # it waits for replies, which the worker must not
+
+    def _reconcile(self) -> None:
+        with suppress(ClosedError):  # the session may close meanwhile
+            self._parameter_keys.reconcile()
 
 
 class Follower(_Copy):

@@ -298,9 +298,7 @@ class ParameterKeys:
             kept = dict(_keyed(after, write.path)) if after is not MISSING else {}
             gone = dict(_keyed(before, write.path)) if before is not MISSING else {}
             stamp = Stamp(write.time, write.clock)
-            for path in gone.keys() - kept.keys():
-                self._session.delete(self._keys.param(path), stamp=stamp)
-            for path in _leaves_above(change.old, write.path):
+            for path in (gone.keys() - kept.keys()).union(_leaves_above(change.old, write.path)):
                 self._session.delete(self._keys.param(path), stamp=stamp)
             for path, value in kept.items():
                 self._put(path, value, stamp)

@@ -92,7 +92,7 @@ def test_another_implementation_of_ros_1_takes_part(folder: Path, network: Netwo
             program.wait_for("ready")
             assert heard.get(timeout=TIMEOUT).data == "from npm"
             program.wait_for("heard from rosz /neighbour")
-            eventually(lambda: node.params.get("/of_foxglove") == [1, "two", 3.5, True])
+            eventually(lambda: node.params.get("/of_foxglove", None) == [1, "two", 3.5, True])
             node.params["/robot/name"] = "c3"
             program.wait_for('update /robot/name "c3"')
             assert "error" not in program.output

@@ -165,6 +165,12 @@ class Rosz(World):
     def command(self, line: str) -> list[str]:
         return [sys.executable, "-m", "rosz", *split(line)]
 
+    def __enter__(self) -> Self:
+        super().__enter__()
+        info = "node info /listener"  # a thread opens its publisher of /rosout
+        eventually(lambda: "/rosout" in self.run(info).out, "its log", _TIMEOUT)
+        return self
+
 
 def _beginning(program: Program) -> Outcome:
     """Return the first lines of what does not end by itself; end it then or at an error."""

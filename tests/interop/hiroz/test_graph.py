@@ -76,11 +76,11 @@ def test_what_commands_list(city: City, shell: Shell) -> None:
     peer.do("listen", "std_msgs/msg/String", "/back", "besteffort")
     peer.do("serve", "/add")
     peer.do("act", "/fibonacci")
+    eventually(lambda: "/fibonacci" in shell("action", "list").lines, "its last tokens")
     assert "/factory/partner" in shell("node", "list").lines
     topics = shell("topic", "list").lines
     assert {"/chatter", "/back", "/parameter_events"} <= {*topics}
     assert "/add" in shell("service", "list").lines
-    assert "/fibonacci" in shell("action", "list").lines
     info = shell("ros2", "topic", "info", "-v", "/chatter").out
     for line in (
         "Node name: partner",

@@ -90,6 +90,7 @@ def test_a_core_that_starts_late_and_again(
         core = town.run(*CORE)
         core.wait_for("started core")
         eventually(lambda: "/early" in shell("node", "list").out, "the node of hiroz")
+        eventually(lambda: "/add" in shell("service", "list").out, "its service")
         assert shell("service", "call", "/add", "20", "22").lines == ["sum: 42"]
         with town.node(f"talker{number}", context=town.context()) as talker:
             publisher = talker.publisher("/chatter", String)

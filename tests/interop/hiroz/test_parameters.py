@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from cli.shell import Shell
-from network import TIMEOUT
+from network import TIMEOUT, eventually
 
 from rosz.msgs.rcl_interfaces.msg import Parameter, ParameterEvent, ParameterType, ParameterValue
 from rosz.msgs.rcl_interfaces.srv import (
@@ -121,6 +121,7 @@ def test_its_services(node: Node, peer: Peer) -> None:
 def test_commands(peer: Peer, shell: Shell) -> None:
     """``ros2 param`` of rosz, with a node of hiroz."""
     peer.do("declare", "speed", 5)
+    eventually(lambda: "/partner" in shell("node", "list").out, "the node of hiroz")
     assert "  speed" in shell("ros2", "param", "list", "/partner").lines
     assert shell("ros2", "param", "get", "/partner", "speed").lines == ["Integer value is: 5"]
     assert shell("ros2", "param", "set", "/partner", "speed", "7").code == 0

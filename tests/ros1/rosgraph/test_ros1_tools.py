@@ -8,6 +8,7 @@ from textwrap import dedent
 from typing import Any
 
 import pytest
+from cli.shell import with_log
 from network import Network, eventually
 
 from rosz.msgs.std_msgs.msg import String
@@ -34,7 +35,7 @@ def robot(network: Network) -> Node:
     node.subscription("orders", String, lambda _: None)
     node.service("switch", SetBool, lambda request: [request.data, "done"])
     node.params.set("/speed", 1.5)
-    return node
+    return with_log(node)
 
 
 def ask(network: Network, snippet: str, *argv: str, **variables: str) -> Any:
