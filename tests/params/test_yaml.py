@@ -118,7 +118,7 @@ def test_texts_mean_what_they_mean_to_rosparam(ros1: Worker, text: str) -> None:
         ("%YAML 3.0\n---\na", "1:1", "incompatible YAML"),
         ("[" * 5000, "1:102", "nested more than 100 deep"),
         ("{a: " * 5000, "1:402", "nested more than 100 deep"),
-        ("<<: 1\na: 2", "1:5", "'<<' takes a mapping"),
+        ("<<: 1\na: 2", "1:5", "expected a mapping or list of mappings for merging, but found"),
     ],
 )
 def test_what_cannot_be_read_is_told_with_its_place(text: str, place: str, reason: str) -> None:
