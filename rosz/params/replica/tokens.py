@@ -35,7 +35,7 @@ class Tokens:
         runner.handlers |= {
             effects.DeclareToken: self._replacing("", lambda _: session.token(keys.token(member))),
             effects.DeclareSeed: self._replacing(
-                "seed", lambda _: session.token(keys.seed_token(member))
+                "seed", lambda _: session.token(keys.token(member, seed=True))
             ),
             effects.UndeclareSeed: self._replacing("seed"),
             effects.FollowAll: self._replacing("all", self._follow_all),
