@@ -34,9 +34,6 @@ class Deleted(enum.Enum):
 
     DELETED = "deleted"
 
-    def __repr__(self) -> str:
-        return "DELETED"
-
 
 DELETED: Final[Literal[Deleted.DELETED]] = Deleted.DELETED
 
