@@ -51,7 +51,7 @@ _SCALAR_FAULTS: Final = (ArithmeticError, AttributeError, LookupError, TypeError
 _MOST_REPEATED: Final = 100_000
 """Values that aliases may add to a document; a document that adds more is refused as an attack."""
 
-_BINARY_OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
+_OPERATORS: Final[dict[str, Callable[..., Any]]] = {
     "Add": operator.add,
     "Sub": operator.sub,
     "Mult": operator.mul,
@@ -59,8 +59,6 @@ _BINARY_OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "FloorDiv": operator.floordiv,
     "Mod": operator.mod,
     "Pow": operator.pow,
-}
-_UNARY_OPERATORS: Final[dict[str, Callable[[Any], Any]]] = {
     "UAdd": operator.pos,
     "USub": operator.neg,
 }
@@ -72,11 +70,13 @@ class _Loader(*_BASES):  # type: ignore[misc]  # PyYAML has no types
     def __init__(self, text: str) -> None:
         _Base.__init__(self, text)
         self.anchors: dict[str, Any] = {}
-        self._depth = -1
+        self._depth = -1  # of the outermost values it is 0
         self._repeated = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         event = self.peek_event()
+        if parent is None:  # a document begins
+            self._repeated = 0
         if isinstance(event, yaml.AliasEvent):
             return self._repeat(self.get_event())
         if event.anchor in self.anchors:
@@ -122,7 +122,7 @@ class _ValueLoader(_Loader):
         if isinstance(node, yaml.ScalarNode):
             if node.tag == _STR and node.value.isascii():
                 return node.value
-            value = super().construct_object(node, deep)
+            value = super().construct_object(node, deep=True)
             try:
                 return normalise(value)
             except ParamError as error:
@@ -132,6 +132,8 @@ class _ValueLoader(_Loader):
         return super().construct_object(node, deep)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Value]:
+        if not isinstance(node, yaml.MappingNode):  # a scalar with the tag of a dict
+            return dict(super().construct_mapping(node, deep))  # raises
         self.flatten_mapping(node)
         return {
             self._construct_key(key): self.construct_object(value, deep)
@@ -416,9 +418,9 @@ def _evaluate(node: Any) -> float:
             return float(node.value)
         case "Name" if node.id == "pi":
             return math.pi
-        case "UnaryOp" if unary := _UNARY_OPERATORS.get(type(node.op).__name__):
+        case "UnaryOp" if unary := _OPERATORS.get(type(node.op).__name__):
             return float(unary(_evaluate(node.operand)))
-        case "BinOp" if binary := _BINARY_OPERATORS.get(type(node.op).__name__):
+        case "BinOp" if binary := _OPERATORS.get(type(node.op).__name__):
             return float(binary(_evaluate(node.left), _evaluate(node.right)))
         case "Call" if not node.keywords:
             return float(_of_math(node.func)(*map(_evaluate, node.args)))
