@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from itertools import takewhile
 from typing import Final
 
 from rosz import names
@@ -57,14 +58,9 @@ def joined(path: Path) -> str:
 
 def common_path(paths: Iterable[Path]) -> Path:
     """Return the longest path that all paths lie at or below; the root if there are no paths."""
-    all_paths = list(paths)
-    if not all_paths:
-        return ROOT
-    first, last = min(all_paths), max(all_paths)
-    length = 0
-    while length < min(len(first), len(last)) and first[length] == last[length]:
-        length += 1
-    return first[:length]
+    every = list(paths) or [ROOT]
+    both = zip(min(every), max(every), strict=False)
+    return tuple(part for part, _ in takewhile(lambda parts: parts[0] == parts[1], both))
 
 
 def resolve(name: str, node: str, remaps: Mapping[str, str] | None = None) -> str:

@@ -14,7 +14,6 @@ from typing import Any, Final
 from rosz.errors import ParamError
 
 _KEY: Final = "ros__parameters"
-_WILDCARD: Final = re.compile(r"/\*\*|/\*")
 
 
 def assign(value: Any, namespace: str) -> list[tuple[str, Any]]:
@@ -82,11 +81,8 @@ def _has_key(tree: Any) -> bool:
 
 def _pattern(name: str) -> re.Pattern[str]:
     """Return the pattern of the nodes that a name with wildcards stands for."""
-    literal = map(re.escape, _WILDCARD.split(name))
-    wildcards = [
-        r"(?:/[^/]+)*" if wildcard == "/**" else "/[^/]+" for wildcard in _WILDCARD.findall(name)
-    ]
-    return re.compile("".join(a + b for a, b in zip(literal, [*wildcards, ""], strict=True)))
+    escaped = re.escape(name).replace(r"/\*\*", "(?:/[^/]+)*")
+    return re.compile(escaped.replace(r"/\*", "/[^/]+"))
 
 
 def _flatten(tree: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

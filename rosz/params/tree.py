@@ -24,9 +24,6 @@ class Missing(enum.Enum):
 
     MISSING = "missing"
 
-    def __repr__(self) -> str:
-        return "MISSING"
-
 
 MISSING: Final[Literal[Missing.MISSING]] = Missing.MISSING
 """The value that `lookup` returns where nothing is set."""

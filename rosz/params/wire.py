@@ -174,16 +174,10 @@ class Keys:
             raise DecodeError("parameter key", 0, f"'{key}', expected '{base}/**'")
         return from_key(key[len(base) + 1 :])
 
-    def token(self, member: ReplicaMember) -> str:
-        """Return the liveliness token of a replica."""
-        return self._token(_REPLICA, member)
-
-    def seed_token(self, member: ReplicaMember) -> str:
-        """Return the second token of a replica that is a seed."""
-        return self._token(_SEED, member)
-
-    def _token(self, kind: str, member: ReplicaMember) -> str:
+    def token(self, member: ReplicaMember, *, seed: bool = False) -> str:
+        """Return the liveliness token of a replica, or the second one of a seed."""
         label = to_key((member.label or "-",))
+        kind = _SEED if seed else _REPLICA
         return own_key(self._domain, kind, member.zid, str(member.start), label)
 
     def member(self, token: str) -> ReplicaMember:
@@ -192,14 +186,14 @@ class Keys:
         Raises:
             DecodeError: The text is not the token of a replica.
         """
-        heads = [own_key(self._domain, kind) + "/" for kind in (_REPLICA, _SEED)]
-        head = next((start for start in heads if token.startswith(start)), "")
-        chunks = token[len(head) :].split("/")
-        if not head or len(chunks) != 3 or not chunks[1].isdecimal():  # noqa: PLR2004  # zid, start, label
+        heads = [own_key(self._domain, kind) for kind in (_REPLICA, _SEED)]
+        head, *chunks = token.rsplit("/", 3)
+        if head not in heads or not chunks[1].isdecimal():
             raise DecodeError(
-                "replica token", 0, f"'{token}', expected '{heads[0]}<zid>/<start>/<who>'"
+                "replica token", 0, f"'{token}', expected '{heads[0]}/<zid>/<start>/<who>'"
             )
-        return ReplicaMember(int(chunks[1]), chunks[0], joined(from_key(chunks[2]))[1:])
+        zid, start, label = chunks
+        return ReplicaMember(int(start), zid, joined(from_key(label))[1:])
 
 
 def check_reach(paths: Iterable[Path], reach: Path) -> None:

@@ -34,9 +34,6 @@ class Deleted(enum.Enum):
 
     DELETED = "deleted"
 
-    def __repr__(self) -> str:
-        return "DELETED"
-
 
 DELETED: Final[Literal[Deleted.DELETED]] = Deleted.DELETED
 
@@ -172,27 +169,11 @@ def condense(changes: Iterable[Change]) -> list[Change]:
     A change that a later one at the same path or above undoes is left out. So of any two changes
     left, the deeper one is the later one, which is the order in which a batch is replayed.
     """
-    top = _Place()
-    for change in changes:
-        place = top
-        for part in change[0]:
-            place = place.below.setdefault(part, _Place())
-        place.change = change
-        place.below = {}
-    return list(top.changes())
-
-
-class _Place:
-    """The last change at a path, and the later changes below it."""
-
-    __slots__ = ("below", "change")
-
-    def __init__(self) -> None:
-        self.below: dict[str, _Place] = {}
-        self.change: Change | None = None
-
-    def changes(self) -> Iterator[Change]:
-        if self.change is not None:
-            yield self.change
-        for place in self.below.values():
-            yield from place.changes()
+    kept: list[Change] = []
+    later: set[Path] = set()
+    for change in reversed(list(changes)):
+        path = change[0]
+        if not any(path[:depth] in later for depth in range(len(path) + 1)):
+            later.add(path)
+            kept.append(change)
+    return kept[::-1]

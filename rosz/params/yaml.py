@@ -9,14 +9,15 @@ Angles are written ``deg(90)``, ``rad(pi/2)``, ``!degrees 90`` or ``!radians 2*p
 evaluates the text of a radian as Python. Here it may hold only numbers, ``pi``, the operators
 ``+ - * / // % **``, parentheses, and functions and constants of ``math``.
 
-PyYAML's own composer recurses in C over nested text, so a few thousand brackets crash the process.
-The composer here reads the parser's events, which are flat. It limits the depth, and the number of
-values that aliases repeat.
+PyYAML's composer in C recurses over nested text, so a few thousand brackets crash the process. The
+loaders here compose with the one in Python, from the events of the parser in C, and limit the depth
+and the number of values that aliases repeat.
 """
 
 from __future__ import annotations
 
 import binascii
+import itertools
 import math
 import operator
 import re
@@ -27,17 +28,17 @@ import yaml
 
 from rosz.errors import ParamError, YamlError
 from rosz.params.ros2_file import assign
-from rosz.params.values import MAX_DEPTH, Value, normalise, type_name, unsound_text
+from rosz.params.values import MAX_DEPTH, Value, copy, normalise, type_name, unsound_text
 
 _NAMESPACE_KEY: Final = "_ns"
 _MAP: Final = "tag:yaml.org,2002:map"
 _SEQ: Final = "tag:yaml.org,2002:seq"
 _BINARY: Final = "tag:yaml.org,2002:binary"
 _STR: Final = "tag:yaml.org,2002:str"
-_MERGE: Final = "tag:yaml.org,2002:merge"
 _NULL: Final = "tag:yaml.org,2002:null"
-_VALUE: Final = "tag:yaml.org,2002:value"
+_Composer: Any = yaml.composer.Composer
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_BASES: Any = (_Base,) if issubclass(_Base, _Composer) else (_Composer, _Base)
 
 _MAX_ANGLE: Final = 200
 """Characters of the text of an angle; a longer one could overflow Python's parser."""
@@ -50,7 +51,7 @@ _SCALAR_FAULTS: Final = (ArithmeticError, AttributeError, LookupError, TypeError
 _MOST_REPEATED: Final = 100_000
 """Values that aliases may add to a document; a document that adds more is refused as an attack."""
 
-_BINARY_OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
+_OPERATORS: Final[dict[str, Callable[..., Any]]] = {
     "Add": operator.add,
     "Sub": operator.sub,
     "Mult": operator.mul,
@@ -58,15 +59,52 @@ _BINARY_OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "FloorDiv": operator.floordiv,
     "Mod": operator.mod,
     "Pow": operator.pow,
-}
-_UNARY_OPERATORS: Final[dict[str, Callable[[Any], Any]]] = {
     "UAdd": operator.pos,
     "USub": operator.neg,
 }
 
 
-class _PlainLoader(_Base):  # type: ignore[misc]  # either of two base classes
-    """PyYAML's safe loader that names the position of a scalar that does not fit its tag."""
+class _Loader(*_BASES):  # type: ignore[misc]  # PyYAML has no types
+    """PyYAML's safe loader with limits, which names the place of what it refuses."""
+
+    def __init__(self, text: str) -> None:
+        _Base.__init__(self, text)
+        self.anchors: dict[str, Any] = {}
+        self._depth = -1  # of the outermost values it is 0
+        self._repeated = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.peek_event()
+        if parent is None:  # a document begins
+            self._repeated = 0
+        if isinstance(event, yaml.AliasEvent):
+            return self._repeat(self.get_event())
+        if event.anchor in self.anchors:
+            raise _fault(event, f"the anchor '&{event.anchor}' is taken")
+        if self._depth == MAX_DEPTH:
+            raise _fault(event, _TOO_DEEP)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def _repeat(self, alias: Any) -> Any:
+        node = self.anchors.get(alias.anchor)
+        if node is None:
+            raise _fault(alias, f"the alias '*{alias.anchor}' names no anchor")
+        if node.end_mark is None:  # the alias stands inside
+            raise _fault(node, "it contains itself")
+        size, height = _measure(node)
+        if self._depth + 1 + height > MAX_DEPTH:
+            raise _fault(alias, _TOO_DEEP)
+        self._repeated += size
+        if self._repeated > _MOST_REPEATED:
+            raise _fault(
+                alias,
+                f"aliases repeat more than {_MOST_REPEATED} values: this looks like a YAML bomb; "
+                "write them out if it is not",
+            )
+        return node
 
     def construct_object(self, node: Any, deep: bool = False) -> Any:
         try:
@@ -74,14 +112,43 @@ class _PlainLoader(_Base):  # type: ignore[misc]  # either of two base classes
         except _SCALAR_FAULTS as error:
             if not isinstance(node, yaml.ScalarNode):
                 raise
-            reason = f"'{node.value}' is not a {_shown_tag(node)}: {error}"
-            raise yaml.constructor.ConstructorError(
-                problem=reason, problem_mark=node.start_mark
-            ) from error
+            raise _fault(node, f"'{node.value}' is not a {_shown_tag(node)}: {error}") from error
 
 
-class _TagLoader(_PlainLoader):
-    """PyYAML's safe loader with rosparam's tags."""
+class _ValueLoader(_Loader):
+    """A loader of values of parameters, with rosparam's tags."""
+
+    def construct_object(self, node: Any, deep: bool = False) -> Any:
+        if isinstance(node, yaml.ScalarNode):
+            if node.tag == _STR and node.value.isascii():
+                return node.value
+            value = super().construct_object(node, deep=True)
+            try:
+                return normalise(value)
+            except ParamError as error:
+                raise _fault(node, str(error)) from error
+        if node.tag != (_SEQ if isinstance(node, yaml.SequenceNode) else _MAP):
+            raise _fault(node, f"the tag '{_shown_tag(node)}' means nothing for a parameter")
+        return super().construct_object(node, deep)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Value]:
+        if not isinstance(node, yaml.MappingNode):  # a scalar with the tag of a dict
+            return dict(super().construct_mapping(node, deep))  # raises
+        self.flatten_mapping(node)
+        return {
+            self._construct_key(key): self.construct_object(value, deep)
+            for key, value in node.value
+        }
+
+    def _construct_key(self, node: Any) -> str:
+        key = self.construct_object(node, deep=True)
+        if type(key) is not str:
+            raise _fault(
+                node,
+                f"the key {key!r} is {type_name(key)}: dictionaries must have string keys; "
+                "put it in quotes if it is a name",
+            )
+        return key
 
 
 class _Dumper(yaml.SafeDumper):
@@ -118,10 +185,7 @@ def load_all(text: str, path: str = "<string>", *, null_as_empty: bool = False) 
     Raises:
         YamlError: The text is not YAML, or holds a value that a parameter cannot hold.
     """
-    return [
-        {} if null_as_empty and node.tag == _NULL else _Builder(loader, path).build(node)
-        for loader, node in _read_nodes(_TagLoader, text, path)
-    ]
+    return [value for value, _ in _read(text, path, null_as_empty=null_as_empty)]
 
 
 def load(text: str, path: str = "<string>") -> Value:
@@ -187,12 +251,7 @@ def read_plain(text: str, path: str) -> Iterator[Any]:
     Raises:
         YamlError: The text is not YAML or is nested too deep, or a value does not fit its tag.
     """
-    for loader, node in _read_nodes(_PlainLoader, text, path):
-        try:
-            value = loader.construct_document(node)
-        except yaml.MarkedYAMLError as error:
-            raise _fault(error.problem_mark or node, str(error.problem), path) from error
-        yield value
+    return (content for content, _ in _load(_Loader, text, path))
 
 
 def dump(value: Value) -> str:
@@ -235,107 +294,42 @@ def _pretty_lines(tree: dict[str, Value], indent: str) -> Iterator[str]:
             yield f"{indent}{key}: {text}"
 
 
-def _read(text: str, path: str) -> Iterator[tuple[Value, int]]:
+def _read(text: str, path: str, *, null_as_empty: bool = False) -> Iterator[tuple[Value, int]]:
     """Yield the value of each document and the line that it starts on, counted from 0."""
-    for loader, node in _read_nodes(_TagLoader, text, path):
-        yield _Builder(loader, path).build(node), node.start_mark.line
+    for value, line in _load(_ValueLoader, text, path, null_as_empty=null_as_empty):
+        yield copy(value), line  # aliases become copies
 
 
-class _Builder:
-    """Builder of the value of one document from its nodes."""
-
-    def __init__(self, loader: Any, path: str) -> None:
-        self._loader = loader
-        self._path = path
-        self._open: set[int] = set()
-
-    def build(self, node: Any) -> Value:
-        """Return the value of a node."""
-        if node.tag == _STR and isinstance(node, yaml.ScalarNode) and node.value.isascii():
-            return node.value
-        if isinstance(node, yaml.ScalarNode):
-            return self._scalar(node)
-        if id(node) in self._open:
-            raise self._error(node, "it contains itself")
-        self._open.add(id(node))
-        if node.tag == _SEQ and isinstance(node, yaml.SequenceNode):
-            value: Value = [self.build(item) for item in node.value]
-        elif node.tag == _MAP and isinstance(node, yaml.MappingNode):
-            value = self._mapping(node)
-        else:
-            raise self._error(node, f"the tag '{_shown_tag(node)}' means nothing for a parameter")
-        self._open.discard(id(node))
-        return value
-
-    def _scalar(self, node: Any) -> Value:
-        try:
-            value = self._loader.construct_object(node, deep=True)
-            return normalise(value)
-        except yaml.MarkedYAMLError as error:
-            raise self._error(node, str(error.problem)) from error
-        except ParamError as error:
-            raise self._error(node, str(error)) from error
-
-    def _mapping(self, node: Any) -> dict[str, Value]:
-        merged: dict[str, Value] = {}
-        own: dict[str, Value] = {}
-        for key_node, value_node in node.value:
-            if key_node.tag == _MERGE:
-                self._merge(merged, value_node)
-            else:
-                own[self._key(key_node)] = self.build(value_node)
-        return {**merged, **own} if merged else own
-
-    def _merge(self, into: dict[str, Value], node: Any) -> None:
-        parts = node.value[::-1] if isinstance(node, yaml.SequenceNode) else [node]
-        for part in parts:
-            if not isinstance(part, yaml.MappingNode):
-                raise self._error(part, "'<<' takes a mapping, or a list of mappings")
-            into.update(self.build(part))
-
-    def _key(self, node: Any) -> str:
-        if node.tag == _VALUE:
-            return str(node.value)
-        key = self.build(node)
-        if type(key) is not str:
-            raise self._error(
-                node,
-                f"the key {key!r} is {type_name(key)}: dictionaries must have string keys; "
-                "put it in quotes if it is a name",
-            )
-        return key
-
-    def _error(self, node: Any, reason: str) -> YamlError:
-        return _fault(node, reason, self._path)
-
-
-def _read_nodes(loader_class: Any, text: str, path: str) -> Iterator[tuple[Any, Any]]:
-    """Yield for each document its loader, which constructs the scalars, and its top node."""
+def _load(
+    loader_class: Any, text: str, path: str, *, null_as_empty: bool = False
+) -> Iterator[tuple[Any, int]]:
+    """Yield the content of each document and the line that it starts on, counted from 0."""
     reason = unsound_text(text)
     if reason:
         raise YamlError(reason, path)
     loader = loader_class(text)
     try:
-        while not loader.check_event(yaml.StreamEndEvent):
-            if isinstance(loader.get_event(), yaml.DocumentStartEvent):
-                yield loader, _Composer(loader, path).compose(0)
+        while loader.check_node():
+            node = loader.get_node()
+            is_empty = null_as_empty and node.tag == _NULL
+            yield {} if is_empty else loader.construct_document(node), node.start_mark.line
     except yaml.reader.ReaderError as error:
         line, column = _place(text, int(error.position))
         reason = f"the character {_shown(error.character)} is not allowed in YAML; write it escaped"
         raise YamlError(reason, path, line, column) from error
     except yaml.MarkedYAMLError as error:
-        parts = [part for part in (error.context, error.problem) if part]
-        reason = ", ".join(parts) or "it is not YAML"
-        if "nesting depth" in reason:
-            raise _too_deep(text, path) from error
+        reason = ", ".join(filter(None, (error.context, error.problem))) or "it is not YAML"
         mark = error.problem_mark or error.context_mark
-        raise (YamlError(reason, path) if mark is None else _fault(mark, reason, path)) from error
+        if "nesting depth" in reason:
+            reason, mark = _TOO_DEEP, _too_deep(text)
+        place = () if mark is None else (mark.line + 1, mark.column + 1)
+        raise YamlError(reason, path, *place) from error
     finally:
         loader.dispose()
 
 
-def _too_deep(text: str, path: str) -> YamlError:
-    """Return the error of a text that libyaml refuses for its depth.
+def _too_deep(text: str) -> Any:
+    """Return the mark at which a text that libyaml refuses for its depth is too deep.
 
     Its scanner, which reads ahead, refuses 1000 levels (in PyYAML 6.0.4) before the composer has
     seen the limit of rosz. PyYAML's own parser has no such limit, and reads as far as that.
@@ -345,92 +339,19 @@ def _too_deep(text: str, path: str) -> YamlError:
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_DEPTH + 1:  # the outermost collection has the depth 0
-            return _fault(event, _TOO_DEEP, path)
-    return YamlError(_TOO_DEEP, path)
+            return event.start_mark
+    return None
 
 
-class _Anchored:
-    """A node that aliases may repeat, with the number of values that each of them adds."""
-
-    def __init__(self, node: Any) -> None:
-        self.node = node
-        self.size = self.height = 0  # until it is complete
-
-
-class _Composer:
-    """Composer of the nodes of one document."""
-
-    def __init__(self, loader: Any, path: str) -> None:
-        self._loader = loader
-        self._path = path
-        self._anchors: dict[str, _Anchored] = {}
-        self._size = 0
-        self._deepest = 0
-        self._repeated = 0
-
-    def compose(self, depth: int) -> Any:
-        event = self._loader.get_event()
-        if isinstance(event, yaml.AliasEvent):
-            return self._repeat(event, depth)
-        self._count(event, depth, 1)
-        node = self._empty(event)
-        if not event.anchor:
-            self._fill(node, event, depth)
-            return node
-        if event.anchor in self._anchors:
-            raise _fault(event, f"the anchor '&{event.anchor}' is taken", self._path)
-        anchored = self._anchors[event.anchor] = _Anchored(node)
-        size, deepest, self._deepest = self._size, self._deepest, depth
-        self._fill(node, event, depth)
-        anchored.size, anchored.height = self._size - size + 1, self._deepest - depth
-        self._deepest = max(deepest, self._deepest)
-        return node
-
-    def _fill(self, node: Any, event: Any, depth: int) -> None:
-        if isinstance(event, yaml.SequenceStartEvent):
-            while not self._loader.check_event(yaml.SequenceEndEvent):
-                node.value.append(self.compose(depth + 1))
-            self._loader.get_event()
-        elif isinstance(event, yaml.MappingStartEvent):
-            while not self._loader.check_event(yaml.MappingEndEvent):
-                node.value.append((self.compose(depth + 1), self.compose(depth + 1)))
-            self._loader.get_event()
-
-    def _repeat(self, alias: Any, depth: int) -> Any:
-        anchored = self._anchors.get(alias.anchor)
-        if anchored is None:
-            raise _fault(alias, f"the alias '*{alias.anchor}' names no anchor", self._path)
-        self._count(alias, depth + anchored.height, anchored.size)
-        self._repeated += anchored.size
-        if self._repeated > _MOST_REPEATED:
-            raise _fault(
-                alias,
-                f"aliases repeat more than {_MOST_REPEATED} values: this looks like a YAML bomb; "
-                "write them out if it is not",
-                self._path,
-            )
-        return anchored.node
-
-    def _count(self, event: Any, depth: int, size: int) -> None:
-        self._size += size
-        self._deepest = max(self._deepest, depth)
-        if depth > MAX_DEPTH:
-            raise _fault(event, _TOO_DEEP, self._path)
-
-    def _empty(self, event: Any) -> Any:
-        kind, content = _NODES[type(event)]
-        text = event.value if kind is yaml.ScalarNode else None
-        tag = event.tag
-        if tag is None or tag == "!":
-            tag = self._loader.resolve(kind, text, event.implicit)
-        return kind(tag, text if content is None else content(), event.start_mark, event.end_mark)
-
-
-_NODES: Final[dict[type, tuple[Any, Any]]] = {
-    yaml.ScalarEvent: (yaml.ScalarNode, None),
-    yaml.SequenceStartEvent: (yaml.SequenceNode, list),
-    yaml.MappingStartEvent: (yaml.MappingNode, list),
-}
+def _measure(node: Any) -> tuple[int, int]:
+    """Return the number of values in a node, with those that aliases repeat, and its height."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1, 0
+    inner = node.value
+    if isinstance(node, yaml.MappingNode):
+        inner = itertools.chain.from_iterable(inner)
+    sizes, heights = zip((0, -1), *map(_measure, inner), strict=True)
+    return 1 + sum(sizes), 1 + max(heights)
 
 
 def _place(text: str, position: int) -> tuple[int, int]:
@@ -442,10 +363,9 @@ def _shown(character: object) -> str:
     return f"U+{character:04X}" if isinstance(character, int) else ascii(character)
 
 
-def _fault(node: Any, reason: str, path: str) -> YamlError:
-    """Return the error that names the position of a node, event or mark of PyYAML."""
-    mark = getattr(node, "start_mark", node)
-    return YamlError(reason, path, mark.line + 1, mark.column + 1)
+def _fault(place: Any, reason: str) -> yaml.MarkedYAMLError:
+    """Return PyYAML's error for a reason at the start of a node or event."""
+    return yaml.constructor.ConstructorError(problem=reason, problem_mark=place.start_mark)
 
 
 def _shown_tag(node: Any) -> str:
@@ -498,9 +418,9 @@ def _evaluate(node: Any) -> float:
             return float(node.value)
         case "Name" if node.id == "pi":
             return math.pi
-        case "UnaryOp" if unary := _UNARY_OPERATORS.get(type(node.op).__name__):
+        case "UnaryOp" if unary := _OPERATORS.get(type(node.op).__name__):
             return float(unary(_evaluate(node.operand)))
-        case "BinOp" if binary := _BINARY_OPERATORS.get(type(node.op).__name__):
+        case "BinOp" if binary := _OPERATORS.get(type(node.op).__name__):
             return float(binary(_evaluate(node.left), _evaluate(node.right)))
         case "Call" if not node.keywords:
             return float(_of_math(node.func)(*map(_evaluate, node.args)))
@@ -518,8 +438,12 @@ def _of_math(node: Any) -> Any:
     return member
 
 
-_TagLoader.add_constructor("!degrees", lambda loader, node: degrees(loader.construct_scalar(node)))
-_TagLoader.add_constructor("!radians", lambda loader, node: radians(loader.construct_scalar(node)))
-for _class in (_TagLoader, _Dumper):  # a text that looks like an angle is written in quotes
+_ValueLoader.add_constructor(
+    "!degrees", lambda loader, node: degrees(loader.construct_scalar(node))
+)
+_ValueLoader.add_constructor(
+    "!radians", lambda loader, node: radians(loader.construct_scalar(node))
+)
+for _class in (_ValueLoader, _Dumper):  # a text that looks like an angle is written in quotes
     _class.add_implicit_resolver("!degrees", re.compile(r"^deg\([^\)]*\)$"), ["d"])
     _class.add_implicit_resolver("!radians", re.compile(r"^rad\([^\)]*\)$"), ["r"])

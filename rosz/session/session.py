@@ -358,7 +358,7 @@ class Session(Closing):
         self,
         key: str,
         callback: Callable[[str, bool], None],
-        complete: Callable[[], None] | None = None,
+        complete: Callable[[], object] | None = None,
         *,
         many: bool = False,
     ) -> Closable:

@@ -47,7 +47,7 @@ class TokenWatch:
         own: Mapping[str, Declared],
         live: Callable[[], list[str]],
     ) -> None:
-        self.complete: Callable[[], None] | None = None
+        self.complete: Callable[[], object] | None = None
         self.existing: Replies | None = None
         self._callback = callback
         self._own = own

@@ -73,7 +73,7 @@ def test_tokens_of_no_replica_are_reported_once(
     replica = network.join(network.session())
     other = network.session()
     zid = "f" * 32
-    seed = KEYS.seed_token(age(replica)).replace(replica.zid, zid)
+    seed = KEYS.token(age(replica), seed=True).replace(replica.zid, zid)
     tokens = [other.token(f"{seed}/{number}") for number in range(5)]
     tokens.append(other.token(seed))
     eventually(lambda: zid in {one.zid for one in replica._runner.core.seeds()}, "a seed")
@@ -121,7 +121,7 @@ def test_a_newcomer_joins_whatever_becomes_of_seeds(network: Network, count: int
     replica.set("/a", 1)
     for _ in range(count):
         mute = Mute(network)
-        network.keep(mute.session.token(KEYS.seed_token(mute.member)))
+        network.keep(mute.session.token(KEYS.token(mute.member, seed=True)))
     if count == joining.SEEDS:
         eventually(lambda: not replica._runner.core.is_seed, "it leaves that to older ones")
     assert network.join(network.command()).get("/a") == 1
@@ -129,13 +129,13 @@ def test_a_newcomer_joins_whatever_becomes_of_seeds(network: Network, count: int
 
 def test_tokens_of_seeds_carry_the_replica() -> None:
     member = ReplicaMember(12, "f0", "a program (pid 1 on here)")
-    assert KEYS.member(KEYS.seed_token(member)) == member
+    assert KEYS.member(KEYS.token(member, seed=True)) == member
 
 
 def test_where_there_is_a_seed_it_appoints_others(network: Network) -> None:
     network.session(SessionConfig(mode="router", rendezvous=network.rendezvous))
     mute = Mute(network)
-    network.keep(mute.session.token(KEYS.seed_token(mute.member)))
+    network.keep(mute.session.token(KEYS.token(mute.member, seed=True)))
     replica = network.join(network.command())
     eventually(lambda: len(replica._runner.core.seeds()) == 1, "it knows the seed")
     sender = network.command()

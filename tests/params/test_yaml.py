@@ -12,7 +12,7 @@ from oracle import Worker
 
 from rosz.errors import YamlError
 from rosz.params.values import normalise
-from rosz.params.yaml import dump, format_get, load, load_all, load_documents, pretty
+from rosz.params.yaml import dump, format_get, load, load_all, load_documents, pretty, read_plain
 
 from .strategies import VALUES
 
@@ -118,7 +118,7 @@ def test_texts_mean_what_they_mean_to_rosparam(ros1: Worker, text: str) -> None:
         ("%YAML 3.0\n---\na", "1:1", "incompatible YAML"),
         ("[" * 5000, "1:102", "nested more than 100 deep"),
         ("{a: " * 5000, "1:402", "nested more than 100 deep"),
-        ("<<: 1\na: 2", "1:5", "'<<' takes a mapping"),
+        ("<<: 1\na: 2", "1:5", "expected a mapping or list of mappings for merging, but found"),
     ],
 )
 def test_what_cannot_be_read_is_told_with_its_place(text: str, place: str, reason: str) -> None:
@@ -279,3 +279,20 @@ def test_any_punctuation_is_a_value_or_the_named_error(text: str) -> None:
         load_all(text)
     except YamlError:
         return
+
+
+@pytest.mark.parametrize("tag", ["!!map", "!!seq", "!!set", "!!omap", "!!pairs"])
+def test_a_scalar_is_not_read_as_what_its_tag_says(tag: str) -> None:
+    for text in ("", "ab"):
+        with pytest.raises(YamlError, match="but found scalar"):
+            load_all(f"x: {tag} '{text}'")
+
+
+def test_aliases_are_counted_for_each_document() -> None:
+    document = f"--- \na: &a [{'x, ' * 60_000}]\nb: *a\n"
+    assert [len(value["b"]) for value in load_all(document * 2)] == [60_000, 60_000]
+
+
+def test_plain_text_that_contains_itself_is_refused_with_its_place() -> None:
+    with pytest.raises(YamlError, match="p:1:1: it contains itself"):
+        list(read_plain("&a [*a]", "p"))

@@ -204,15 +204,15 @@ class Exchange:
 
     def _on_ack(self, sample: Sample) -> None:
         payload = sample.payload
-        zid, _, reason = payload[_ACK.size :].partition(_SEPARATOR)
+        who, _, reason = payload[_ACK.size :].partition(_SEPARATOR)
+        zid = who.removeprefix(_AT_WORK)
         if zid.isalnum():
             number = _ACK.unpack_from(payload)[0]
             self._runner.run_soon(
                 events.Acknowledged(zid.decode(), number, reason.decode(errors="replace"))
+                if zid == who
+                else events.Progressed(number, zid.decode())
             )
-        elif zid[:1] == _AT_WORK and zid[1:].isalnum():
-            number = _ACK.unpack_from(payload)[0]
-            self._runner.run_soon(events.Progressed(number, zid[1:].decode()))
 
     # Batches of others
 
@@ -231,7 +231,10 @@ class Exchange:
             elif deferred := self._runner.defer(message, reach):
                 self._acknowledge(effects.Acknowledge(*deferred))
             else:
-                self._runner.receive(message, reach)
+                event = self._runner.read_batch(message, reach)
+                # A batch that is dropped is not acknowledged, so the sender repeats it.
+                if isinstance(event, events.MemberLeft) or not self._runner.worker.full:
+                    self._runner.run_soon(event)
         except DecodeError as error:
             self._runner.report(NOT_A_PARAMETER, error)
         except RoszError as error:

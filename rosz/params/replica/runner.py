@@ -132,6 +132,7 @@ class CoreRunner:
         storage: What keeps the writes, if anything does.
 
     Attributes:
+        core: The core; only what is replaced as a whole may be read without the lock.
         worker: Worker for timers, and for events for which the lock was not soon free.
         watchers: Callbacks that are notified of changes.
         handlers: Function that carries out an effect after the step, for each type of them.
@@ -150,7 +151,7 @@ class CoreRunner:
             StartTimer: self._start_timer,
         }
         self.on_own_change: Callable[[TreeChanged], object] = lambda _: None
-        self._core = core
+        self.core: ReplicaCore = core
         self._clock = clock
         self._root: Tree = {}
         self._lock = threading.RLock()
@@ -173,7 +174,7 @@ class CoreRunner:
 
     def __enter__(self) -> History:
         self._acquire()
-        return self._core.history
+        return self.core.history
 
     def __exit__(self, *_: object) -> None:
         self._release()
@@ -181,11 +182,6 @@ class CoreRunner:
     def __len__(self) -> int:
         with self as history:
             return len(history)
-
-    @property
-    def core(self) -> ReplicaCore:
-        """The core; only what is replaced as a whole may be read without the lock."""
-        return self._core
 
     @property
     def root(self) -> Tree:
@@ -262,21 +258,6 @@ class CoreRunner:
             raise pending.result
         return pending.result
 
-    def receive(self, message: bytes, reach: Path) -> None:
-        """Apply a message of another replica now or on the worker; drop it if the worker is full.
-
-        Args:
-            message: Message with its header.
-            reach: Path that all writes in the message must lie at or below.
-
-        Raises:
-            DecodeError: The message is not a batch.
-        """
-        event = self.read_batch(message, reach)
-        if isinstance(event, MemberLeft) or not self.worker.full:
-            self.run_soon(event)
-        # A dropped batch is not acknowledged, so the sender repeats it.
-
     def read_batch(
         self, message: bytes, reach: Path, query: int = 0, *, acknowledged: bool = False
     ) -> BatchReceived | MemberLeft:
@@ -306,7 +287,7 @@ class CoreRunner:
             written_at = read_time(memoryview(message)[start:])
         except DecodeError:
             return None
-        if not number or not self._core.may_defer(written_at, time.time_ns()):
+        if not number or not self.core.may_defer(written_at, time.time_ns()):
             return None
         self._deferred.append((message, reach))
         # A watcher that was added after the first check would miss this message.
@@ -349,7 +330,7 @@ class CoreRunner:
             return []
         moment = Moment(time.clock_gettime(_CLOCK), time.time_ns())
         remaining: list[Effect] = []
-        for effect in self._core.step(event, moment):
+        for effect in self.core.step(event, moment):
             carry_out = self._under_lock.get(type(effect))
             if carry_out is None:
                 remaining.append(effect)

@@ -28,19 +28,18 @@ class Tokens:
         self._session = session
         self._keys = keys
         self._runner = runner
-        self._member = runner.core.config.member
-        self._token: Closable | None = None
-        self._seed_token: Closable | None = None
-        self._watch: Closable | None = None
-        self._seed_watch: Closable | None = None
+        self._declared: dict[str, Closable] = {}
         self._lock = threading.RLock()
         self._closed = False
+        member = runner.core.config.member
         runner.handlers |= {
-            effects.DeclareToken: partial(self._submit, self._declare_token),
-            effects.DeclareSeed: partial(self._submit, self._declare_seed),
-            effects.UndeclareSeed: partial(self._submit, self._undeclare_seed),
-            effects.FollowAll: partial(self._submit, self._follow_all),
-            effects.UnfollowAll: partial(self._submit, self._unfollow_all),
+            effects.DeclareToken: self._replacing("", lambda _: session.token(keys.token(member))),
+            effects.DeclareSeed: self._replacing(
+                "seed", lambda _: session.token(keys.token(member, seed=True))
+            ),
+            effects.UndeclareSeed: self._replacing("seed"),
+            effects.FollowAll: self._replacing("all", self._follow_all),
+            effects.UnfollowAll: self._replacing("all"),
         }
 
     def follow_seeds(self, timeout: float) -> None:
@@ -54,50 +53,42 @@ class Tokens:
         """
         complete = threading.Event()
         on_token = partial(self._on_token, None)
-        self._seed_watch = self._session.watch_tokens(self._keys.seeds, on_token, complete.set)
+        watch = self._session.watch_tokens(self._keys.seeds, on_token, complete.set)
+        self._declared["seeds"] = watch
         complete.wait(timeout)
 
     def close(self) -> None:
         """Undeclare everything; a second call has no effect."""
         with self._lock:
             self._closed = True
-        for declared in (self._token, self._seed_token, self._seed_watch, self._watch):
-            if declared is not None:
-                declared.close()
+        for declared in self._declared.values():
+            declared.close()
 
-    def _submit(self, handle: Callable[[Any], object], effect: effects.Effect) -> None:
-        self._runner.worker.submit(partial(self._unless_closed, handle, effect))
+    def _replacing(
+        self, name: str, declare: Callable[[Any], Closable | None] = lambda _: None
+    ) -> Callable[[Any], object]:
+        """Return the handler of an effect that takes the place of what has a name, if anything."""
 
-    def _unless_closed(self, handle: Callable[[Any], object], effect: effects.Effect) -> None:
-        with self._lock:
-            if not self._closed:
-                handle(effect)
+        def replace(effect: effects.Effect) -> None:
+            with self._lock:
+                if self._closed:
+                    return
+                before = self._declared.pop(name, None)
+                if before is not None:
+                    before.close()
+                declared = declare(effect)
+                if declared is not None:
+                    self._declared[name] = declared
 
-    def _declare_token(self, _: effects.DeclareToken) -> None:
-        self._token = self._session.token(self._keys.token(self._member))
+        return lambda effect: self._runner.worker.submit(partial(replace, effect))
 
-    def _declare_seed(self, _: effects.DeclareSeed) -> None:
-        self._seed_token = self._session.token(self._keys.seed_token(self._member))
-
-    def _undeclare_seed(self, _: effects.UndeclareSeed) -> None:
-        token, self._seed_token = self._seed_token, None
-        if token is not None:
-            token.close()
-
-    def _follow_all(self, effect: effects.FollowAll) -> None:
-        number = effect.watch
-
-        def on_complete() -> None:
-            self._runner.run(events.MembersKnown(number))
-
-        self._watch = self._session.watch_tokens(
-            self._keys.tokens, partial(self._on_token, number), on_complete, many=True
+    def _follow_all(self, effect: effects.FollowAll) -> Closable:
+        return self._session.watch_tokens(
+            self._keys.tokens,
+            partial(self._on_token, effect.watch),
+            lambda: self._runner.run(events.MembersKnown(effect.watch)),
+            many=True,
         )
-
-    def _unfollow_all(self, _: effects.UnfollowAll) -> None:
-        watch, self._watch = self._watch, None
-        if watch is not None:
-            watch.close()
 
     def _on_token(self, watch: int | None, token: str, alive: bool) -> None:  # a callback
         """Report a token of a replica that is followed, or of a seed without a number."""
