@@ -267,7 +267,7 @@ def test_who_stood_still_waits_for_those_whose_links_are_gone() -> None:
     talk.stand_still(11.0)
     talk.write("a")
     number = talk.only(done.Publish).number
-    assert talk.core.recovering
+    assert talk.core._members.recovering
     talk.say(said.Acknowledged("bb", number), said.SeedWent("cc"), said.MemberWent(watch, "cc"))
     assert not talk.all(done.Answer)
     talk.sleep(2.0)
@@ -276,7 +276,7 @@ def test_who_stood_still_waits_for_those_whose_links_are_gone() -> None:
     talk.say(said.Acknowledged("bb", number + 1))
     assert talk.answer.slow == ("process cc (link lost)",)
     talk.sleep(10.0)
-    assert not talk.core.recovering
+    assert not talk.core._members.recovering
     talk.write("c")
     talk.say(said.Acknowledged("bb", number + 2))
     assert talk.answer.slow == ()

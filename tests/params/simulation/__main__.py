@@ -7,11 +7,14 @@ import sys
 import time
 from pathlib import Path
 
+from msgspec import structs
+
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from params.simulation.exploration import Result, explore  # found by the line above
 from params.simulation.histories import play_seed
 from params.simulation.scripts import SCRIPTS
+from params.simulation.search import Result  # found by the line above
+from params.simulation.sweep import sweep
 from params.simulation.violation import Violation
 
 
@@ -38,8 +41,11 @@ def play(steps: int, seed: int, length: int, rounds: int) -> int:
 
 def tell(result: Result, waiting: int) -> None:
     """Print how far an exploration is."""
-    if not result.states % 100_000:
-        print(f"{result.states} states, {waiting} wait", file=sys.stderr, flush=True)
+    print(
+        f"{result.states} states, {waiting} wait, {result.seconds:.0f} s",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def main() -> int:
@@ -52,12 +58,18 @@ def main() -> int:
     parser.add_argument(
         "--explore", nargs="+", choices=sorted(SCRIPTS), help="explore small worlds instead"
     )
-    parser.add_argument("--states", type=int, default=1_000_000, help="states to explore at most")
+    parser.add_argument("--states", type=int, default=1 << 32, help="states to explore at most")
+    parser.add_argument("--calls", type=int, help="explore only the first calls of a world")
+    parser.add_argument("--timers", type=int, help="timers that may fire early in a world")
     arguments = parser.parse_args()
     if arguments.explore:
         findings = 0
         for name in arguments.explore:
-            result = explore(SCRIPTS[name], arguments.states, tell)
+            script = SCRIPTS[name]
+            steps = script.steps[: arguments.calls]
+            timers = script.advances if arguments.timers is None else arguments.timers
+            script = structs.replace(script, steps=steps, advances=timers)
+            result = sweep(script, arguments.states, tell)
             print(f"{name}: {result}", flush=True)
             findings += bool(result.finding)
         return int(findings > 0)

@@ -14,12 +14,9 @@ the core heeds which one is older.
 from __future__ import annotations
 
 import itertools
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any, NamedTuple
-
-import msgspec
+from typing import Any
 
 from rosz.params.replica.core import events as said
 
@@ -29,118 +26,12 @@ from .disk import Disk
 from .process import Process
 from .scripts import Script, Step
 from .stage import Reaction, Sent, Stage, next_due, serves
+from .states import Draft, Item, Move, State, Told, story_of
 from .violation import Violation
-from .world import World, line_of
+from .world import World
 
 _QUIET = 45.0
 _LIMIT = 2.0
-
-
-class Result(msgspec.Struct):
-    """What an exploration found.
-
-    Attributes:
-        states: Number of states of the world.
-        moves: Number of moves between them.
-        ends: Number of states in which nothing was left to happen.
-        processes: Number of different states of processes, those of quiet times among them.
-        steps: Steps of cores that were made; the others were known.
-        finished: Whether all states were explored.
-        seconds: How long it took.
-        finding: What did not hold.
-    """
-
-    states: int = 0
-    moves: int = 0
-    ends: int = 0
-    processes: int = 0
-    steps: int = 0
-    finished: bool = True
-    seconds: float = 0.0
-    finding: str = ""
-
-    def __str__(self) -> str:
-        end = "all" if self.finished else "not all"
-        return (
-            f"{self.states} states ({end}), {self.moves} moves, {self.ends} ends,"
-            f" {self.processes} states of processes, {self.steps} steps,"
-            f" {self.seconds:.1f} s\n{self.finding}"
-        ).rstrip()
-
-
-class _Item(NamedTuple):
-    """Something on its way.
-
-    Attributes:
-        kind: ``deliver``, ``look``, ``report`` or ``finish``.
-        zid: Session of the process that it reaches.
-        source: Session that sent it, or of the process to look at; empty if it is its own.
-        event: What is delivered.
-        number: Number of a watch.
-        query: Session and number of the query that it belongs to.
-    """
-
-    kind: str
-    zid: str
-    source: str = ""
-    event: Any = None
-    number: int = 0
-    query: tuple[str, int] | None = None
-
-
-class _State(NamedTuple):
-    """A state of the world.
-
-    Attributes:
-        now: Time in seconds.
-        processes: Number of the state of the process of each machine; 0 if none runs.
-        lives: Number of processes that each machine has had.
-        disks: Number of the disk of each machine without a process.
-        ended: Numbers of the last states of processes that ended.
-        pending: Numbers of what is on its way, sorted.
-        cuts: Links that are cut.
-        left: Numbers of the calls that are still to come.
-        budget: How many cuts, crashes, losses and early timers are left.
-        lossless: Whether no message was lost.
-    """
-
-    now: float
-    processes: tuple[int, ...]
-    lives: tuple[int, ...]
-    disks: tuple[int, ...]
-    ended: tuple[int, ...]
-    pending: tuple[int, ...]
-    cuts: frozenset[tuple[str, str]]
-    left: tuple[int, ...]
-    budget: tuple[int, int, int, int]
-    lossless: bool
-
-
-_Told = list[tuple[str, Any]]
-
-
-class _Draft:
-    """A state that is being made.
-
-    Args:
-        state: The state before.
-
-    Attributes:
-        told: What happened, for a trace.
-    """
-
-    def __init__(self, state: _State) -> None:
-        self.now = state.now
-        self.processes = list(state.processes)
-        self.lives = list(state.lives)
-        self.disks = list(state.disks)
-        self.ended = state.ended
-        self.pending = list(state.pending)
-        self.cuts = state.cuts
-        self.left = state.left
-        self.budget = list(state.budget)
-        self.lossless = state.lossless
-        self.told: _Told = []
 
 
 class Exploration:
@@ -155,7 +46,7 @@ class Exploration:
         self.stage = Stage(script.setting)
         self.machines = self.stage.machines
         self._judge = World(script.setting)
-        self._items: list[_Item] = []
+        self.items: list[Item] = [Item("none", "")]
         self._numbers: dict[Any, int] = {}
         self._item_of: dict[tuple[int, str, str], tuple[int, said.Event]] = {}
         self._reactions: dict[Any, Reaction] = {}
@@ -163,7 +54,7 @@ class Exploration:
         self._calm: set[int] = set()
         self._judged: set[int] = set()
 
-    def first(self) -> _State:
+    def first(self) -> State:
         """Return the state in which all replicas know each other, and have written once."""
         script = self.script
         count = len(self.machines)
@@ -173,8 +64,8 @@ class Exploration:
         )
         budget = (script.cuts, script.crashes, script.losses, script.advances)
         left = tuple(range(len(script.steps)))
-        draft = _Draft(
-            _State(100.0, none, none, disks, (), (), frozenset(), left, budget, lossless=True)
+        draft = Draft(
+            State(100.0, none, none, disks, (), (), frozenset(), left, budget, lossless=True)
         )
         for index in range(count):
             self._start(draft, index)
@@ -183,24 +74,25 @@ class Exploration:
             self._call(draft, self.machines.index(machine), -1)
             self._settle(draft, 3.0)
         draft.told = []
-        return self._freeze(draft)
+        return self.freeze(draft)
 
     # States
 
-    def _process(self, draft: _Draft, index: int) -> Process | None:
+    def _process(self, draft: Draft, index: int) -> Process | None:
         number = draft.processes[index]
         return self.stage.states[number] if number else None
 
-    def _at(self, draft: _Draft, zid: str) -> int:
+    def _at(self, draft: Draft, zid: str) -> int:
         """Return the index of the machine of a process that runs; -1 if it does not."""
         index = self.machines.index(zid[0])
         process = self._process(draft, index)
         return index if process is not None and process.zid == zid else -1
 
-    def _freeze(self, draft: _Draft) -> _State:
+    def freeze(self, draft: Draft) -> State:
+        """Return the state that a draft became."""
         pending = [number for number in draft.pending if self._matters(draft, number)]
         draft.pending = sorted(pending)
-        return _State(
+        return State(
             draft.now,
             tuple(draft.processes),
             tuple(draft.lives),
@@ -213,12 +105,25 @@ class Exploration:
             draft.lossless,
         )
 
-    def _matters(self, draft: _Draft, number: int) -> bool:
+    def form_of(self, state: State) -> int:
+        """Return a hash of a state that heeds none of the numbers of this exploration."""
+        states = self.stage.states
+        return hash(
+            (
+                state._replace(processes=(), disks=(), ended=(), pending=()),
+                tuple([Form().of(states[number]) if number else 0 for number in state.processes]),
+                frozenset((states[n].zid, Form().of(states[n].core.history)) for n in state.ended),
+                tuple([Form().of(self._disks[number]) for number in state.disks]),
+                len(state.pending),
+            )
+        )
+
+    def _matters(self, draft: Draft, number: int) -> bool:
         """Tell whether something on its way can change anything.
 
         A look that shows nothing new does not: whatever changes makes others look again.
         """
-        item = self._items[number]
+        item = self.items[number]
         index = self._at(draft, item.zid)
         if index < 0:
             return False
@@ -231,20 +136,20 @@ class Exploration:
         watched = process.watching and member != (item.source in process.members)
         return seed != is_known or watched
 
-    def _look(self, draft: _Draft, process: Process, zid: str) -> tuple[Process | None, bool]:
+    def _look(self, draft: Draft, process: Process, zid: str) -> tuple[Process | None, bool]:
         """Return another process if it runs, and whether both are linked."""
         index = self._at(draft, zid)
         other = self._process(draft, index) if index >= 0 else None
         here, there = process.machine, zid[0]
         return other, (here, there) not in draft.cuts and (there, here) not in draft.cuts
 
-    def _number(self, item: _Item) -> int:
+    def _number(self, item: Item) -> int:
         """Return the number of something on its way."""
         form = (item.kind, item.zid, item.source, item.number, Form().of(item.event))
         number = self._numbers.get(form)
         if number is None:
-            number = self._numbers[form] = len(self._items)
-            self._items.append(item)
+            number = self._numbers[form] = len(self.items)
+            self.items.append(item)
         return number
 
     def _number_of_disk(self, disk: Disk | None) -> int:
@@ -259,13 +164,13 @@ class Exploration:
 
     # Steps of processes
 
-    def _react(self, draft: _Draft, index: int, key: Any, do: Callable[[Process], object]) -> None:
+    def _react(self, draft: Draft, index: int, key: Any, do: Callable[[Process], object]) -> None:
         """Let a process do something, and carry out what comes of it."""
         number = draft.processes[index]
         process = self.stage.states[number]
         taken = tuple(
             query[1]
-            for query in (self._items[item].query for item in draft.pending)
+            for query in (self.items[item].query for item in draft.pending)
             if query is not None and query[0] == process.zid
         )
         full = number, key, draft.now, taken
@@ -274,16 +179,17 @@ class Exploration:
             reaction = self._reactions[full] = self.stage.react(process, draft.now, taken, do)
         self._carry_out(draft, index, reaction)
 
-    def _carry_out(self, draft: _Draft, index: int, reaction: Reaction) -> None:
+    def _carry_out(self, draft: Draft, index: int, reaction: Reaction) -> None:
         draft.told += reaction.told
-        if reaction.asked:
+        draft.answers = draft.answers or bool(reaction.asked)
+        if reaction.asked and draft.judges:
             self._judge_answers(draft, index, reaction)
         draft.processes[index] = reaction.after
         process = self.stage.states[reaction.after]
         for sent in reaction.sent:
             self._carry(draft, index, process, sent)
 
-    def _judge_answers(self, draft: _Draft, index: int, reaction: Reaction) -> None:
+    def _judge_answers(self, draft: Draft, index: int, reaction: Reaction) -> None:
         """Check what the answers of a process promise, given what all others have."""
         others = tuple(other for at, other in enumerate(draft.processes) if at != index)
         case = id(reaction), others, draft.ended, draft.cuts, draft.lossless, draft.now
@@ -294,7 +200,7 @@ class Exploration:
             judge.checks.answers.on_answer(asked.process, asked.answer, asked.effects)
         self._judged.add(hash(case))
 
-    def _carry(self, draft: _Draft, index: int, process: Process, sent: Sent) -> None:
+    def _carry(self, draft: Draft, index: int, process: Process, sent: Sent) -> None:
         zid, others = process.zid, self._others(draft, index)
         if sent.kind in {"one", "query"}:
             others = [other for other in others if other.zid == sent.target]
@@ -304,9 +210,9 @@ class Exploration:
             draft.ended = tuple(sorted({*draft.ended, self._remains(process)}))
         if sent.kind in {"end", "show"}:
             for other in others:
-                self._add(draft, _Item("look", other.zid, zid))
+                self._add(draft, Item("look", other.zid, zid))
         elif sent.kind in {"finish", "report"}:
-            self._add(draft, _Item(sent.kind, zid, number=sent.number))
+            self._add(draft, Item(sent.kind, zid, number=sent.number))
         elif sent.kind == "own":
             self._send(draft, zid, sent.event, "")
         elif sent.kind == "query" and not others:
@@ -317,12 +223,13 @@ class Exploration:
             else:
                 self._send(draft, other.zid, sent.event, zid)
 
-    def _add(self, draft: _Draft, item: _Item) -> None:
+    def _add(self, draft: Draft, item: Item) -> None:
         number = self._number(item)
+        draft.added.append(number)
         if number not in draft.pending:
             draft.pending.append(number)
 
-    def _send(self, draft: _Draft, zid: str, event: said.Event, source: str) -> None:
+    def _send(self, draft: Draft, zid: str, event: said.Event, source: str) -> None:
         place = id(event), zid, source
         if place not in self._item_of:
             query: tuple[str, int] | None = None
@@ -331,11 +238,12 @@ class Exploration:
             elif isinstance(event, (said.SyncReceived, said.WritesReceived)):
                 query = self.stage.asker(event.query)
             # The event is kept, and so its id is not given to another one.
-            number = self._number(_Item("deliver", zid, source, event, 0, query))
+            number = self._number(Item("deliver", zid, source, event, 0, query))
             self._item_of[place] = number, event
+        draft.added.append(self._item_of[place][0])
         draft.pending.append(self._item_of[place][0])
 
-    def _others(self, draft: _Draft, index: int) -> list[Process]:
+    def _others(self, draft: Draft, index: int) -> list[Process]:
         every = (self._process(draft, other) for other in range(len(self.machines)))
         return [other for at, other in enumerate(every) if other is not None and at != index]
 
@@ -347,7 +255,7 @@ class Exploration:
             self.stage.states.append(process)
         return self._numbers[form]
 
-    def _set_up(self, draft: _Draft, *replaced: Process) -> World:
+    def _set_up(self, draft: Draft, *replaced: Process) -> World:
         """Return the world of a state, for checks that need all of it."""
         judge = self._judge
         every = [self.stage.states[number] for number in draft.processes if number]
@@ -361,78 +269,96 @@ class Exploration:
 
     # What may be next
 
-    def successors(self, state: _State) -> Iterator[tuple[_State, _Told]]:
-        """Yield the state after each thing that may be next, and what happens."""
-        for draft in self._drafts(state):
-            yield self._freeze(draft), draft.told
+    def successors(self, state: State) -> Iterator[tuple[Move, State, Told]]:
+        """Yield each thing that may be next, the state after it, and what happens."""
+        for move in self._moves(state):
+            draft = self.make(state, move)
+            yield move, self.freeze(draft), draft.told
 
-    def _drafts(self, state: _State) -> Iterator[_Draft]:
+    def _moves(self, state: State) -> Iterator[Move]:
+        """Yield what may be next."""
         may_advance = bool(state.budget[3])
         for number in dict.fromkeys(state.pending):
-            item = self._items[number]
-            draft = _Draft(state)
-            self._happen(draft, number)
-            yield draft
+            item = self.items[number]
+            yield Move("happen", number)
             # What a machine finds out about itself is there before the next timer.
-            may_advance = may_advance and (item.kind != "deliver" or bool(item.source))
-            if state.budget[2] and item.kind == "deliver" and item.source:
-                draft = _Draft(state)
-                draft.budget[2] -= 1
-                draft.lossless = False
-                draft.pending.remove(number)
-                draft.told = [(item.zid, f"-- does not get {item.event!r:.200}")]
-                yield draft
-        for index in sorted(
-            {self.machines.index(self.script.steps[call].machine) for call in state.left}
-        ):
-            number = state.processes[index]
-            if number and serves(self.stage.states[number]):
-                draft = _Draft(state)
-                self._call_next(draft, index)
-                yield draft
-        if may_advance:
-            draft = _Draft(state)
-            if self._advance(draft, urgent=True):
-                draft.budget[3] -= 1
-                yield draft
+            may_advance = may_advance and not item.is_own
+            if state.budget[2] and item.can_be_lost:
+                yield Move("lose", number)
+        machines = {self.script.steps[call].machine for call in state.left}
+        for index, number in enumerate(state.processes):
+            if number and self.machines[index] in machines and serves(self.stage.states[number]):
+                yield Move("call", index)
+        if may_advance and self.next_timer(state.processes, urgent=True) is not None:
+            yield Move("advance")
         yield from self._faults(state)
 
-    def _faults(self, state: _State) -> Iterator[_Draft]:
+    def _faults(self, state: State) -> Iterator[Move]:
         goes_on = bool(state.left or state.pending)
-        for one, other in itertools.combinations(self.machines, 2):
-            is_cut = (one, other) in state.cuts
+        for one, other in itertools.combinations(range(len(self.machines)), 2):
+            is_cut = (self.machines[one], self.machines[other]) in state.cuts
             if (is_cut or state.budget[0]) and goes_on:
-                draft = _Draft(state)
-                draft.budget[0] -= not is_cut
-                self._turn(draft, one, other)
-                yield draft
+                yield Move("turn", one, other)
         for index, number in enumerate(state.processes):
             if not number:
-                draft = _Draft(state)
-                self._start(draft, index)
-                yield draft
+                yield Move("start", index)
             elif state.budget[1] and goes_on:
-                draft = _Draft(state)
+                yield Move("crash", index)
+
+    def make(self, state: State, move: Move, *, judges: bool = True) -> Draft:
+        """Make a move.
+
+        Args:
+            state: The state before.
+            move: The move.
+            judges: Whether to check what answers promise.
+        """
+        draft = Draft(state)
+        draft.judges = judges
+        match move.kind:
+            case "happen":
+                self._happen(draft, move.what)
+            case "lose":
+                item = self.items[move.what]
+                draft.budget[2] -= 1
+                draft.lossless = False
+                draft.pending.remove(move.what)
+                draft.told = [(item.zid, f"-- does not get {item.event!r:.200}")]
+            case "call":
+                self._call_next(draft, move.what)
+            case "advance":
+                draft.budget[3] -= 1
+                self._advance(draft, urgent=True)
+            case "turn":
+                one, other = self.machines[move.what], self.machines[move.other]
+                draft.budget[0] -= (one, other) not in draft.cuts
+                self._turn(draft, one, other)
+            case "start":
+                self._start(draft, move.what)
+            case "crash":
                 draft.budget[1] -= 1
-                self._crash(draft, index)
-                yield draft
+                self._crash(draft, move.what)
+        return draft
 
     # What happens
 
-    def _happen(self, draft: _Draft, number: int) -> None:
+    def _happen(self, draft: Draft, number: int) -> None:
         """Let something that is on its way happen."""
         draft.pending.remove(number)
-        item = self._items[number]
+        item = self.items[number]
         index = self._at(draft, item.zid)
         if index < 0:
             return
         stage, process = self.stage, self.stage.states[draft.processes[index]]
         if item.kind == "finish":
             self._react(draft, index, number, stage.finish)
+            disk = self.stage.states[draft.processes[index]].disk
+            if disk is not None and disk.pending:
+                self._add(draft, item)
         elif item.kind == "look":
             other, linked = self._look(draft, process, item.source)
             if other is None:
-                other = next(p for p in reversed(stage.states) if _is_named(p, item.source))
+                other = stage.named[item.source]
                 linked = False
             shown = (other.member.start, other.seed and linked, other.token and linked)
             do = partial(stage.look, other=other, linked=linked)
@@ -452,13 +378,13 @@ class Exploration:
         else:
             self._react(draft, index, number, partial(stage.take, event=item.event))
 
-    def _call_next(self, draft: _Draft, index: int) -> None:
+    def _call_next(self, draft: Draft, index: int) -> None:
         machine = self.machines[index]
         call = next(call for call in draft.left if self.script.steps[call].machine == machine)
         draft.left = tuple(other for other in draft.left if other != call)
         self._call(draft, index, call)
 
-    def _call(self, draft: _Draft, index: int, call: int) -> None:
+    def _call(self, draft: Draft, index: int, call: int) -> None:
         """Let a process make a call; -1 is the one before all others."""
         machine = self.machines[index]
         step = self.script.steps[call] if call >= 0 else Step(machine, ("w", machine))
@@ -475,33 +401,38 @@ class Exploration:
         do = partial(self.stage.ask, event=event, limit=limit)
         self._react(draft, index, ("call", call), do)
 
-    def _advance(self, draft: _Draft, *, urgent: bool, until: float = float("inf")) -> bool:
-        """Let the next timer fire; return whether there is one."""
+    def next_timer(
+        self, processes: Sequence[int], *, urgent: bool
+    ) -> tuple[float, Any, int] | None:
+        """Return the time and the key of the next timer of all, and the index of its machine."""
         dues = [
             (*due, index)
-            for index, number in enumerate(draft.processes)
+            for index, number in enumerate(processes)
             if number and (due := next_due(self.stage.states[number], urgent=urgent))
         ]
-        if not dues:
+        return min(dues, key=lambda entry: (entry[0], entry[2]), default=None)
+
+    def _advance(self, draft: Draft, *, urgent: bool, until: float = float("inf")) -> bool:
+        """Let the next timer fire; return whether there is one."""
+        timer = self.next_timer(draft.processes, urgent=urgent)
+        if timer is None or timer[0] > until:
             return False
-        due_at, key, index = min(dues, key=lambda entry: (entry[0], entry[2]))
-        if due_at > until:
-            return False
+        due_at, key, index = timer
         draft.now = max(draft.now, due_at)
         self._react(draft, index, ("fire", key), partial(self.stage.fire, key=key))
         return True
 
-    def _turn(self, draft: _Draft, one: str, other: str) -> None:
+    def _turn(self, draft: Draft, one: str, other: str) -> None:
         """Cut a link, or mend it."""
         is_cut = (one, other) in draft.cuts
         draft.told = [(one, f"-- the link to {other} is {'mended' if is_cut else 'cut'}")]
         draft.cuts = draft.cuts ^ {(one, other), (other, one)}
         here, there = (self._process(draft, self.machines.index(name)) for name in (one, other))
         if here is not None and there is not None:
-            self._add(draft, _Item("look", here.zid, there.zid))
-            self._add(draft, _Item("look", there.zid, here.zid))
+            self._add(draft, Item("look", here.zid, there.zid))
+            self._add(draft, Item("look", there.zid, here.zid))
 
-    def _crash(self, draft: _Draft, index: int) -> None:
+    def _crash(self, draft: Draft, index: int) -> None:
         process: Process = clone(self.stage.states[draft.processes[index]], {})
         if process.disk is not None:
             process.disk.crash()
@@ -509,7 +440,7 @@ class Exploration:
         draft.told = [(process.zid, "-- crashes")]
         self._carry(draft, index, process, Sent("end"))
 
-    def _start(self, draft: _Draft, index: int) -> None:
+    def _start(self, draft: Draft, index: int) -> None:
         others = self._others(draft, index)
         disk = self._disks[draft.disks[index]]
         reaction = self.stage.boot(
@@ -521,7 +452,7 @@ class Exploration:
 
     # The quiet time
 
-    def _settle(self, draft: _Draft, seconds: float, *, calm: bool = False) -> bool:
+    def _settle(self, draft: Draft, seconds: float, *, calm: bool = False) -> bool:
         """Let all happen in one order, for some time.
 
         Args:
@@ -535,7 +466,7 @@ class Exploration:
         until = draft.now + seconds
         passed: list[int] = []
         while True:
-            state = self._freeze(draft)
+            state = self.freeze(draft)
             if calm:
                 passed.append(hash(state))
                 if passed[-1] in self._calm:
@@ -549,9 +480,9 @@ class Exploration:
         self._calm.update(passed)
         return False
 
-    def finish(self, state: _State) -> None:
+    def finish(self, state: State) -> None:
         """Mend everything, wait, and check what must hold then."""
-        draft = _Draft(state)
+        draft = Draft(state)
         draft.left, draft.budget = (), [0, 0, 0, 0]
         for one, other in itertools.combinations(self.machines, 2):
             if (one, other) in draft.cuts:
@@ -564,64 +495,4 @@ class Exploration:
             if self._settle(draft, _QUIET, calm=True):
                 Checks(self._set_up(draft)).on_quiet()
         except Violation as violation:
-            raise Violation(f"{violation}\nin the quiet time:\n{_story(draft.told)}") from None
-
-
-def _is_named(process: Process, zid: str) -> bool:
-    return getattr(process, "zid", "") == zid
-
-
-def _story(told: _Told) -> str:
-    return "\n".join(f"{zid:3} {line_of(what)}" for zid, what in told)
-
-
-def explore(
-    script: Script, most: int = 1_000_000, tell: Callable[[Result, int], object] = lambda *_: None
-) -> Result:
-    """Explore all that may happen in a small world, up to a number of states.
-
-    Args:
-        script: The small world.
-        most: Number of states to stop at.
-        tell: Function called from time to time, with the result so far and the number of states
-            that wait.
-    """
-    begun, result = time.monotonic(), Result()
-    path: Any = None
-    exploration = Exploration(script)
-    try:
-        first = exploration.first()
-        met = {hash(first)}
-        stack: list[tuple[_State, Any]] = [(first, None)]
-        while stack:
-            if result.states >= most:
-                result.finished = False
-                break
-            state, path = stack.pop()
-            result.states += 1
-            if not result.states % 10_000:
-                result.seconds = time.monotonic() - begun
-                tell(result, len(stack))
-            is_end = True
-            for successor, told in exploration.successors(state):
-                is_end = False
-                result.moves += 1
-                form = hash(successor)
-                if form not in met:
-                    met.add(form)
-                    stack.append((successor, (path, told)))
-            if is_end:
-                result.ends += 1
-                exploration.finish(state)
-    except Violation as violation:
-        steps: list[_Told] = []
-        while path is not None:
-            path, told = path
-            steps.append(told)
-        story = _story([line for told in reversed(steps) for line in told])
-        result.finding = f"{violation}\nafter:\n{story}"
-        result.finished = False
-    result.processes = len(exploration.stage.states)
-    result.steps = exploration.stage.steps
-    result.seconds = time.monotonic() - begun
-    return result
+            raise Violation(f"{violation}\nin the quiet time:\n{story_of(draft.told)}") from None

@@ -113,6 +113,7 @@ class Stage(World):
         self.states: list[Process] = [Process.__new__(Process)]
         self.listener = self.checks.answers = _Listener(self)
         self.calls_made = 0
+        self.named: dict[str, Process] = {}
         self._forms: dict[int, int] = {}
         self._sent: list[Sent] = []
         self._told: list[Any] = []
@@ -171,7 +172,9 @@ class Stage(World):
             unseen = {source for source, target in cuts if target == machine}
             self._seen = frozenset(other.zid for other in others if other.machine not in unseen)
             self.start(machine)
-            return self.running[machine]
+            process = self.running[machine]
+            self.named[process.zid] = process
+            return process
 
         return self._record(now, (), act)
 

@@ -7,9 +7,11 @@ import os
 import pytest
 
 from . import mutations
-from .exploration import explore
 from .mutations import Mutation, faulty
-from .scripts import SCRIPTS
+from .scripts import SCRIPTS, Script
+from .search import explore
+from .sweep import sweep
+from .world import Setting
 
 MOST = int(os.environ.get("ROSZ_EXAMPLES", "100")) * 3
 
@@ -21,12 +23,29 @@ def test_what_must_hold_holds_in_every_order(name: str) -> None:
     assert not result.finding
 
 
-@pytest.mark.parametrize("name", ["two", "two, loss"])
-def test_all_of_a_small_world_is_explored(name: str) -> None:
-    result = explore(SCRIPTS[name], 5000)
-    print(f"{name}: {result}")
+@pytest.mark.parametrize("name", ["two", "two, loss", "two, stored"])
+def test_a_sweep_reaches_what_a_search_reaches(name: str) -> None:
+    _compare(SCRIPTS[name])
+
+
+@pytest.mark.parametrize(
+    ("machines", "calls", "cuts", "crashes"), [(2, 1, 0, 1), (2, 2, 1, 0), (3, 2, 0, 0)]
+)
+def test_a_sweep_reaches_it_despite_faults(
+    machines: int, calls: int, cuts: int, crashes: int
+) -> None:
+    steps = SCRIPTS["two, four"].steps[:calls]
+    _compare(Script(Setting(machines=machines, stored=1), steps, cuts, crashes, advances=0))
+
+
+def _compare(script: Script) -> None:
+    result, reference = sweep(script), explore(script)
+    print(result)
     assert result.finished, result.finding
-    assert result.ends
+    assert reference.finished, reference.finding
+    assert (result.states, result.moves) == (reference.states, reference.moves)
+    assert result.finals == reference.finals
+    assert len(result.finals) == result.ends > 0
 
 
 @pytest.mark.parametrize(
@@ -48,3 +67,19 @@ def test_a_fault_is_found(mutation: Mutation, name: str) -> None:
         result = explore(SCRIPTS[name], 2000)
     print(f"{mutation.__name__}: {result.states} states: {result.finding.splitlines()[:1]}")
     assert result.finding
+
+
+@pytest.mark.parametrize(
+    ("mutation", "name", "last"),
+    [
+        (mutations.never_sends_again, "two, loss", "StoppedPeersFound"),
+        (mutations.leaves_without_handing_over, "two, end", "WriteCalled"),
+        (mutations.takes_an_acknowledgement_for_the_newest_batch, "two, four", "Publish"),
+    ],
+    ids=lambda value: getattr(value, "__name__", value),
+)
+def test_a_sweep_tells_what_led_to_a_fault(mutation: Mutation, name: str, last: str) -> None:
+    with faulty(mutation):
+        result = sweep(SCRIPTS[name], 2000)
+    assert not result.finished
+    assert last in result.finding.split("after:\n")[1]

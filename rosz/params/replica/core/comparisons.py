@@ -11,13 +11,13 @@ from typing import Final, NamedTuple
 
 from rosz.errors import DecodeError
 from rosz.params.history import EMPTY_DIGEST, Differences
-from rosz.params.paths import Path, common_path, joined
+from rosz.params.paths import Path, common_path
 from rosz.params.replica.core.deliveries import Deliveries
 from rosz.params.replica.core.effects import Reply, SendQuery
 from rosz.params.replica.core.events import QueryEnded, SyncReceived, WritesReceived
 from rosz.params.replica.core.members import Members
 from rosz.params.replica.core.store import Store
-from rosz.params.replica.core.work import Work
+from rosz.params.replica.core.work import Work, named
 from rosz.params.wire import (
     Index,
     Record,
@@ -298,11 +298,10 @@ class Comparisons:
     def _report_refused(self, zid: str) -> None:
         paths = self._unreported.pop(zid, [])
         if paths:
-            more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
             self._work.log(
                 logging.WARNING,
-                f"{self._members.label(zid)} does not take '{joined(paths[0])}'{more}, which"
-                " differs there from now on: the rules beside its keys may not allow it",
+                f"{self._members.label(zid)} does not take {named(paths)}, which differs there"
+                " from now on: the rules beside its keys may not allow it",
             )
 
     def _trim_refused(self) -> None:

@@ -21,7 +21,7 @@ from rosz.params.paths import Path, joined
 from rosz.params.replica.core.effects import Answer, FindStoppedPeers, Outcome, Publish, Resend
 from rosz.params.replica.core.events import Acknowledged, Progressed, WriteCalled
 from rosz.params.replica.core.members import Members
-from rosz.params.replica.core.work import Work
+from rosz.params.replica.core.work import Work, named
 from rosz.params.wire import Batch
 
 DELIVERY: Final = "delivery"
@@ -57,11 +57,6 @@ class _OpenBatch:
         self.storing = False
         self.is_late = False
         self.resent: set[str] = set()
-
-    @property
-    def name(self) -> str:
-        more = f" and {len(self.paths) - 1} more" if len(self.paths) > 1 else ""
-        return f"'{joined(self.paths[0])}'{more}"
 
     @property
     def deadline(self) -> float:
@@ -298,7 +293,7 @@ class Deliveries:
         result: Outcome | ParamError
         if delivery.reasons:
             reasons = {self._label(zid): why for zid, why in delivery.reasons.items()}
-            result = PartlyWritten(delivery.name, holders, reasons, slow)
+            result = PartlyWritten(named(delivery.paths), holders, reasons, slow)
         else:
             alone = not (holders or self._members.zids or delivery.finding)
             result = Outcome(delivery.batch.time, slow, holders, alone)
@@ -314,8 +309,8 @@ class Deliveries:
             seconds = self._work.now.seconds - delivery.began
             self._work.log(
                 logging.WARNING,
-                f"{delivery.name} is written, but not yet known to {', '.join(late)}, which did not"
-                f" answer within {seconds:.2g} s",
+                f"{named(delivery.paths)} is written, but not yet known to {', '.join(late)}, which"
+                f" did not answer within {seconds:.2g} s",
             )
         self._lagging |= delivery.waiting
         known = self._members.zids | self._members.awaited()

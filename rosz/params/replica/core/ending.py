@@ -6,7 +6,7 @@ import logging
 
 import msgspec
 
-from rosz.params.paths import Path, joined
+from rosz.params.paths import Path
 from rosz.params.replica.core.calls import CALL, Calls
 from rosz.params.replica.core.comparisons import Compared, Comparisons
 from rosz.params.replica.core.deliveries import Deliveries
@@ -14,7 +14,7 @@ from rosz.params.replica.core.effects import Answer, Leave
 from rosz.params.replica.core.events import CloseCalled
 from rosz.params.replica.core.members import Members
 from rosz.params.replica.core.store import Store
-from rosz.params.replica.core.work import Work
+from rosz.params.replica.core.work import Work, named
 
 
 class Ending(msgspec.Struct, eq=False):
@@ -87,10 +87,9 @@ class Ending(msgspec.Struct, eq=False):
         # If all others have ended in the ordinary way, the store ends with the last one.
         unreached = members.zids or members.lost_all
         if unshared and unreached and not self._store.disk.is_current:
-            more = f" and {len(unshared) - 1} more" if len(unshared) > 1 else ""
             self._work.log(
                 logging.WARNING,
-                f"'{joined(unshared[0])}'{more} is lost with this process, which ends: no other"
+                f"{named(unshared)} is lost with this process, which ends: no other"
                 " that holds the parameters could be reached",
             )
         self._deliveries.abandon()

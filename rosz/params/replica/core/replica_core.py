@@ -108,11 +108,6 @@ class ReplicaCore:
         """Whether it is the oldest seed."""
         return self._seeding.is_oldest
 
-    @property
-    def recovering(self) -> bool:
-        """Whether it stood still a moment ago, and waits for those that gave up their links."""
-        return self._members.recovering
-
     def members(self) -> list[ReplicaMember]:
         """Return the others that are visible, oldest first."""
         return self._members.all()

@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 import logging
 import random
+from collections.abc import Sequence
 from typing import Final
 
 import msgspec
 
 from rosz.errors import DecodeError
+from rosz.params.paths import Path, joined
 from rosz.params.replica.core.effects import Effect, Log, StartTimer
 from rosz.params.replica.core.events import Moment, Timer
 from rosz.params.wire import ReplicaMember
@@ -36,6 +38,12 @@ class Config(msgspec.Struct, frozen=True):
     listens: bool = False
     seed: int = 0
     keep: int = KEPT_TOMBSTONES
+
+
+def named(paths: Sequence[Path]) -> str:
+    """Return the first of some paths, and how many more there are, as shown to users."""
+    more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+    return f"'{joined(paths[0])}'{more}"
 
 
 def damage(what: str, error: DecodeError) -> Log:
