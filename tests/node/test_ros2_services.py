@@ -434,7 +434,9 @@ def test_who_was_there_hears_of_the_first_parameters(network: Network) -> None:
     asker = network.node("asker")
     asker.params["/late"] = {"rate": 5, "gains": {"p": 0.5}}
     events = subscribe_events(asker)
-    network.node("late")
+    context = network.context()
+    assert context.mesh.linked.wait(TIMEOUT)  # else who was there seems to come later
+    network.node("late", context=context)
     assert next_event(events, "/late") == [
         {"use_sim_time": False, "rate": 5, "gains.p": 0.5},
         {},
