@@ -50,10 +50,7 @@ class DirectDelivery:
         self._receivers: dict[str, Callable[[Sample], None]] = {}
 
     def register(
-        self,
-        entity_id: int,
-        receive: Callable[[Sample], None],
-        announced: Callable[[Sample], None],
+        self, entity_id: int, receive: Callable[[Sample], None], announced: Callable[[Sample], None]
     ) -> Registration:
         """Pass on the samples that are sent to one subscription.
 

@@ -33,6 +33,8 @@ _SILENT_SECONDS = 0.1
 """Time after which a peer that does not tell its links is one that never does, such as a command or
 a node of ROS 2. Before that, its queryable may not be declared here yet, and it may know further
 peers. A command, which has to be fast, does not wait for that."""
+_BUSY_SECONDS = 1.0
+"""The same for a peer that is registered on this machine, which tells them once it has time."""
 _MOST_PEERS = 60
 """Peers from which on a newcomer is told of cores, as every two sessions of a mesh are linked."""
 _ADVICE = "use a core for so many nodes (run 'rosz core', and start nodes with ROSZ_MODE=client)"
@@ -122,13 +124,13 @@ class MeshReadiness:
             if now_linked != peers:
                 peers, latest = now_linked, now
             missing = self._missing(_QUERY_TIMEOUT) if now_linked and self._mesh else set()
-            silent = self._link_timeout and self._mesh and set(now_linked) - self._replied
-            if now_linked and not missing and not (silent and now - latest < _SILENT_SECONDS):
+            if now_linked and not missing and not self._may_learn_more(now_linked, now - latest):
                 self._warn_of_many(len(now_linked))
                 return
+            if now - latest >= _SILENT_SECONDS:
+                pause = _LATER_POLL_SECONDS
             if now - began >= self._timeout:
                 self.ready.set()
-                pause = _LATER_POLL_SECONDS
             if now - latest >= max(self._timeout, self._link_timeout):
                 break
         if missing and self._link_timeout and not self._stop.is_set():
@@ -139,6 +141,13 @@ class MeshReadiness:
                 self._link_timeout,
                 _ADVICE,
             )
+
+    def _may_learn_more(self, linked: list[str], seconds: float) -> bool:
+        """Tell whether some peers may yet tell their links, so long after the newest link."""
+        silent = set(linked) - self._replied
+        if not (silent and self._link_timeout and self._mesh and seconds < _BUSY_SECONDS):
+            return False
+        return seconds < _SILENT_SECONDS or not silent.isdisjoint(self._session.running_peers())
 
     def _warn_of_many(self, peers: int) -> None:
         """Advise a newcomer to a large mesh, each of whose sessions it costs a link."""

@@ -201,11 +201,7 @@ class Query(RawItem, Closing):
             self._raw.reply(key, payload, attachment=attachment, timestamp=to_timestamp(stamp))
 
     def forward(
-        self,
-        reply: Reply,
-        key: str,
-        payload: bytes | None = None,
-        attachment: bytes | None = None,
+        self, reply: Reply, key: str, payload: bytes | None = None, attachment: bytes | None = None
     ) -> None:
         """Send a reply, or an error, that arrived on another session.
 

@@ -11,7 +11,7 @@ from network import TIMEOUT, Network, repeats
 
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Context, standard
-from rosz.session import LocalPeers, MeshReadiness
+from rosz.session import LocalPeers, MeshReadiness, mesh, serve_links
 from rosz.session.local_peers import LocalPeer, LocalRegistration
 
 ONE_SHOT = """
@@ -187,6 +187,17 @@ def test_one_that_begins_at_the_same_moment(
     assert context.session.peers() == [other.zid]
     (registration,) = registrations
     registration.close()
+
+
+def test_a_busy_peer_may_know_others(network: Network, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A peer of this machine that has not told its links yet is waited for."""
+    monkeypatch.setattr(mesh, "_BUSY_SECONDS", TIMEOUT)
+    busy = network.session()
+    newcomer = network.context().mesh
+    assert not newcomer.linked.wait(3 * mesh._SILENT_SECONDS)
+    served = serve_links(busy)
+    assert newcomer.linked.wait(TIMEOUT)
+    served.close()
 
 
 def test_nobody_else_no_wait(network: Network) -> None:

@@ -120,12 +120,12 @@ def test_publishers_listeners_and_commands(network: Network) -> None:
     assert command.exit_code() == 0, command.output
     assert "- Translation: [1.000, 0.000, 0.500]" in command.lines
 
-    def tree() -> list[str]:
+    def tree() -> tuple[int, list[str]]:
         command = start(network, "tf", "tree", "--wait", "0.5")
-        assert command.exit_code() == 0, command.output
-        return command.lines
+        return command.exit_code(), command.lines
 
-    eventually(lambda: tree() == ["map", "  base", "    laser"], "what comes within half a second")
+    frames = ["map", "  base", "    laser"]
+    eventually(lambda: tree() == (0, frames), "what comes within half a second")
     watch = start(network, "run", "tf", "tf_monitor")
     watch.wait_for("Frame: base published by /mover Average Delay: ")
     for program in (static, moving):

@@ -119,10 +119,7 @@ class BagFiles(Closing):
     """
 
     def __init__(
-        self,
-        options: RecordOptions,
-        report: Callable[[str], object],
-        first: int = 0,
+        self, options: RecordOptions, report: Callable[[str], object], first: int = 0
     ) -> None:
         self._options = options
         self._report = report

@@ -59,9 +59,7 @@ def pack(packet: Packet) -> bytes:
         raise EncodeError(f"packet of topic {packet.topic}", "", reason)
     length = struct.pack("<H", size)
     body = struct.pack("<H", packet.topic) + packet.payload
-    return bytes(
-        [_SYNC, _VERSION, *length, _checksum(length), *body, _checksum(body)],
-    )
+    return bytes([_SYNC, _VERSION, *length, _checksum(length), *body, _checksum(body)])
 
 
 class PacketReader:

@@ -266,7 +266,7 @@ def test_rostopic(network: Network) -> None:
 
 
 def test_publish_by_type_name(network: Network, robot: Node) -> None:
-    heard = robot.subscription("news", String)
+    heard = robot.subscription("news", String, queue_size=1000)  # twenty a second, until it is read
     program = network.program(
         """
         import rosz.ros1

@@ -36,11 +36,7 @@ class Statistics:
     """
 
     def __init__(
-        self,
-        topic: str,
-        node: str,
-        params: Params,
-        publish: Callable[[TopicStatistics], object],
+        self, topic: str, node: str, params: Params, publish: Callable[[TopicStatistics], object]
     ) -> None:
         def limit(name: str, default: float) -> float:
             return params.get(f"/statistics_window_{name}", default, type=float)
