@@ -503,11 +503,6 @@ class Session(Closing):
                 ends.setdefault(str(link.zid), []).append(str(link.dst))
         return ends
 
-    def running_peers(self) -> set[str]:
-        """Return the ids of the linked peers of this machine whose processes are not stopped."""
-        running = {peer.zid for peer in LocalPeers.read(self._rendezvous) if not peer.is_stopped}
-        return running.intersection(self.peers(routers=False))
-
     def out_of_reach(self) -> set[str]:
         """Return the ids of the sessions of this machine whose processes are stopped."""
         return {peer.zid for peer in LocalPeers.read(self._rendezvous).stopped}
