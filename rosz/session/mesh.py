@@ -22,6 +22,7 @@ import msgspec
 
 from rosz.errors import RoszError
 from rosz.lifecycle import Closable
+from rosz.session.local_peers import LocalPeers
 from rosz.session.queries import Query
 from rosz.session.session import Session
 
@@ -147,7 +148,11 @@ class MeshReadiness:
         silent = set(linked) - self._replied
         if not (silent and self._link_timeout and self._mesh and seconds < _BUSY_SECONDS):
             return False
-        return seconds < _SILENT_SECONDS or not silent.isdisjoint(self._session.running_peers())
+        if seconds < _SILENT_SECONDS:
+            return True
+        nearby = LocalPeers.read(self._session.others.rendezvous)
+        running = {peer.zid for peer in nearby if not peer.is_stopped}
+        return not silent.isdisjoint(running.intersection(self._session.peers(routers=False)))
 
     def _warn_of_many(self, peers: int) -> None:
         """Advise a newcomer to a large mesh, each of whose sessions it costs a link."""

@@ -100,7 +100,6 @@ class Session(Closing):
         self.zid: str = str(raw.zid())
         self.clock: HybridClock = HybridClock(self.zid)
         self._raw: Any = raw
-        self._rendezvous = rendezvous
         self._lifecycle = Lifecycle("the session", log=_log, on_fork=self._close_in_child)
         self._registration: LocalRegistration | None = None
         self._link_watch: Closable | None = None
@@ -490,7 +489,7 @@ class Session(Closing):
         return (
             ""
             if self._registration is None
-            else direct_endpoint(self._rendezvous, self._registration.peer)
+            else direct_endpoint(self.others.rendezvous, self._registration.peer)
         )
 
     def links(self) -> dict[str, list[str]]:
@@ -503,18 +502,13 @@ class Session(Closing):
                 ends.setdefault(str(link.zid), []).append(str(link.dst))
         return ends
 
-    def running_peers(self) -> set[str]:
-        """Return the ids of the linked peers of this machine whose processes are not stopped."""
-        running = {peer.zid for peer in LocalPeers.read(self._rendezvous) if not peer.is_stopped}
-        return running.intersection(self.peers(routers=False))
-
     def out_of_reach(self) -> set[str]:
         """Return the ids of the sessions of this machine whose processes are stopped."""
-        return {peer.zid for peer in LocalPeers.read(self._rendezvous).stopped}
+        return {peer.zid for peer in LocalPeers.read(self.others.rendezvous).stopped}
 
     def why_silent(self, *sessions: str) -> str:
         """Return which of some sessions are stopped, and what to do; empty if none is."""
-        return LocalPeers.read(self._rendezvous).why_silent(sessions)
+        return LocalPeers.read(self.others.rendezvous).why_silent(sessions)
 
     @property
     def closed(self) -> bool:
@@ -527,7 +521,7 @@ class Session(Closing):
         To undeclare something, Zenoh waits for room in the queue of each link. In this context,
         links to stopped processes are closed if they have none.
         """
-        return nullcontext() if self.closed else close_links(self._raw, self._rendezvous)
+        return nullcontext() if self.closed else close_links(self._raw, self.others.rendezvous)
 
     def close(self) -> None:
         """Close the session and all that is declared on it; a second call has no effect."""
@@ -537,7 +531,7 @@ class Session(Closing):
         raw, self._raw = self._raw, ClosedSession("the session is closed")
         if self._registration is not None:
             self._registration.close()
-        links = close_links(raw, self._rendezvous, self._ports)
+        links = close_links(raw, self.others.rendezvous, self._ports)
         with links, translate_errors("close the session"):
             try:
                 raw.close()
