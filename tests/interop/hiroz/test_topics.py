@@ -130,15 +130,17 @@ def test_latched(city: City, peer: Peer, depth: int) -> None:
     kept = [str(number) for number in range(depth)]
     node = city.node("rosz_side")
     ours = node.publisher("/ours", String, qos=qos)
+    witness = city.node("witness").subscription("/ours", String, qos=qos)
     for value in ["dropped", *kept]:
         ours.publish(value)
         peer.do("publish", "std_msgs/msg/String", "/theirs", f"latched{depth}", text(value))
+    eventually(lambda: witness.get(TIMEOUT).data == kept[-1], "the last, beyond the core as well")
 
     peer.do("listen", "std_msgs/msg/String", "/ours", f"latched{depth}")
     assert [peer.next("heard /ours")["data"] for _ in kept] == kept
     volatile = city.peer("/volatile")
     volatile.do("listen", "std_msgs/msg/String", "/ours", "-")
-    ours.wait_for_subscribers(2, TIMEOUT)
+    ours.wait_for_subscribers(3, TIMEOUT)
     ours.publish("live")
     assert volatile.next("heard /ours")["data"] == "live"
 
