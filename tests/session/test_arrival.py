@@ -99,7 +99,8 @@ def test_a_newcomer_to_a_large_mesh(
     network: Network, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(mesh, "_MOST_PEERS", 2)
-    monkeypatch.setattr(mesh, "_SILENT_SECONDS", TIMEOUT)  # the nodes of this test all reply
+    for seconds in ("_SILENT_SECONDS", "_BUSY_SECONDS"):  # the nodes of this test all reply
+        monkeypatch.setattr(mesh, seconds, TIMEOUT)
     first, second = network.node("one").context, network.node("two").context
     assert second.mesh.linked.wait(TIMEOUT)
     eventually(lambda: first.session.peers() == [second.session.zid], "both are linked")
