@@ -89,7 +89,9 @@ def serve_control(node: NodeCore) -> None:
         if reason and ending.acquire(blocking=False):
             # Hooks of the program may take their time, and more requests may come meanwhile.
             name = f"rosz-shutdown{node.name}"
-            start_thread(threading.Thread(None, node.shutdown, name, (reason,), daemon=True))
+            start_thread(
+                threading.Thread(target=node.shutdown, args=(reason,), name=name, daemon=True)
+            )
 
     worker = node.keep(Worker[Query](f"rosz-control{node.name}", serve, threads=_THREADS))
     node.keep(context.session.queryable(key, worker.submit))

@@ -30,7 +30,7 @@ from rosz.session.declared import (
     translate_errors,
 )
 from rosz.session.local_peers import LocalPeers, LocalRegistration, direct_endpoint
-from rosz.session.opening import open_raw, places_of
+from rosz.session.opening import open_raw
 from rosz.session.queries import (
     PRIORITIES,
     TARGETS,
@@ -138,8 +138,10 @@ class Session(Closing):
             registration.opened(str(raw.zid()))
         session = cls(raw, secured=config.keys is not None, rendezvous=config.rendezvous)
         session._registration, session.others = registration, others
-        ports = [Endpoint(end).port for ends in places_of(config) for end in ends]
-        session._ports = [*filter(None, ports), *([registration.peer.port] if registration else [])]
+        if config.mode != "client":
+            ends = map(Endpoint, (config.rendezvous, *config.listen, *config.connect))
+            ports = (registration.peer.port if registration else 0, *(end.port for end in ends))
+            session._ports = [port for port in ports if port]
         if config.mode != "client" or config.reaches_beyond:
             session._link_watch = close_links_at_once(raw)
         return session

@@ -103,9 +103,9 @@ class Shell:
 
         It asks the session at the meeting point, to which others may have told it only just now.
         """
-        found = (getattr(one, "session", one) for one in self.network._open)
-        sessions = [one for one in found if isinstance(one, Session) and not one.closed]
-        tokens = [(key, token) for one in sessions for key, token in one._tokens.items()]
+        opened = (getattr(entry, "session", entry) for entry in self.network._open)
+        sessions = [entry for entry in opened if isinstance(entry, Session) and not entry.closed]
+        tokens = [row for session in sessions for row in session._tokens.items()]
         wanted = {key for key, token in tokens if key.startswith(_SPACE) and not token.closed}
         if len(sessions) < _SEVERAL or wanted <= self._seen:
             return

@@ -14,7 +14,7 @@ export default class Backdrop {
       this.change();
     };
     mesh.addEventListener("added", () => {
-      this.thin(getElement(view).renderer);
+      this.drawOnChange(getElement(view).renderer);
       paint();
     });
     new MutationObserver(paint).observe(document.body, { attributes: true, attributeFilter: ["class"] });
@@ -25,7 +25,7 @@ export default class Backdrop {
     this.changed = performance.now();
   }
 
-  thin(renderer) {
+  drawOnChange(renderer) {
     const draw = renderer.render.bind(renderer);
     const [before, now] = [new THREE.Matrix4(), new THREE.Matrix4()];
     let drawn = 0;
