@@ -10,22 +10,26 @@ import logging
 import sys
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 import msgspec
 
-from rosz.errors import RoszError
+from rosz.errors import RoszError, WaitTimeout
+from rosz.graph import Followed
 from rosz.lifecycle import Registration
 from rosz.node.core import NodeCore
 from rosz.node.standard import follow_clock
 from rosz.session import Query
-from rosz.wire import ProcessToken, format_process, nodes_key, own_key, parse_token
+from rosz.wire import ProcessToken, nodes_key, own_key, parse_token
 from rosz.worker import Worker, start_thread
 
 _log = logging.getLogger("rosz.control")
 
 _THREADS = 4
 _TOKENS_TIMEOUT = 0.5
+_ATTEMPTS = 10
+_PAUSE = 0.1
 _NEWER = "new node registered with same name"
 _REPLY_TIMEOUT = 1.0
 _TOGETHER = 0.2
@@ -157,43 +161,45 @@ def _info(node: NodeCore) -> NodeInfo:
 
 def yield_to_newer(node: NodeCore) -> None:
     """Shut a node down when a newer one of the same name appears."""
-    duplicates = Worker[ProcessToken](
-        f"rosz-takeover{node.name}", lambda other: _compare(node, other), threads=_THREADS
-    )
+    namesakes = node.keep(node.context.graph.follow_processes(node.name))
+
+    def compare(other: ProcessToken) -> None:
+        if not node.is_shutdown and _is_newer(node, namesakes, other):
+            text = "shutdown request: [%s] Reason: %s (process %d on %s)"
+            node.log.warning(text, node.name, _NEWER, other.pid, other.host)
+            node.shutdown(_NEWER)
+
+    duplicates = Worker[ProcessToken](f"rosz-takeover{node.name}", compare, threads=_THREADS)
 
     def appeared(other: ProcessToken, alive: bool) -> None:
         if alive and other.node == node.name and other != node.process:
             duplicates.submit(other)
 
     node.keep(Registration(lambda: duplicates.close(0)))
-    namesakes = node.keep(node.context.graph.follow_processes(node.name))
     node.keep(Registration(namesakes.listen(appeared)))
 
 
-def _compare(node: NodeCore, other: ProcessToken) -> None:
-    """Shut a node down if another one of its name is newer."""
-    if not node.is_shutdown and _is_newer(node, other):
-        text = "shutdown request: [%s] Reason: %s (process %d on %s)"
-        node.log.warning(text, node.name, _NEWER, other.pid, other.host)
-        node.shutdown(_NEWER)
-
-
-def _is_newer(node: NodeCore, other: ProcessToken) -> bool:
+def _is_newer(node: NodeCore, namesakes: Followed, other: ProcessToken) -> bool:
     """Return whether another node is newer, even if the clocks of the two machines differ."""
     key = control_key(other.domain, other.zid, other.node_id)
     request = msgspec.msgpack.encode(Request("info"))
-    asked = time.monotonic()
-    try:
-        replies = node.context.session.get(key, payload=request, timeout=_REPLY_TIMEOUT)
-        if not (replies or node.context.session.live_tokens(format_process(other), _REPLY_TIMEOUT)):
-            return False  # it has ended, perhaps as it found this one newer
-        infos = [msgspec.msgpack.decode(r.payload, type=NodeInfo) for r in replies if r.ok]
-    except (RoszError, msgspec.DecodeError):
-        infos = []
-    if infos:
-        round_trip = time.monotonic() - asked
-        lead = asked + round_trip / 2 - node.began - infos[0].age
-        if abs(lead) > max(_TOGETHER, round_trip):
-            return lead > 0
+    for _ in range(_ATTEMPTS):
+        asked = time.monotonic()
+        try:
+            replies = node.context.session.get(key, payload=request, timeout=_REPLY_TIMEOUT)
+            infos = [msgspec.msgpack.decode(r.payload, type=NodeInfo) for r in replies if r.ok]
+        except (RoszError, msgspec.DecodeError):
+            break
+        if infos:
+            round_trip = time.monotonic() - asked
+            lead = asked + round_trip / 2 - node.began - infos[0].age
+            if abs(lead) > max(_TOGETHER, round_trip):
+                return lead > 0
+        if replies:
+            break
+        # Queries reach a node a while after its token arrives, and no longer when it ends.
+        with suppress(WaitTimeout):
+            namesakes.wait_for(lambda view: other not in view.processes(), _PAUSE, "its end")
+            return False
     # They started together, or the other one did not respond: compare the times in their tokens.
     return other.newer_than(node.process)

@@ -6,12 +6,17 @@ import threading
 import time
 from queue import SimpleQueue
 from types import SimpleNamespace
+from typing import Any
 
+import msgspec
 import pytest
 from network import TIMEOUT, Network, eventually
 
+from rosz.graph import Followed
 from rosz.msgs.std_msgs.msg import String
 from rosz.node import Node, control, core
+from rosz.node.control import NodeInfo
+from rosz.session import Query, Reply
 from rosz.wire import ProcessToken, format_process
 
 LOSER = """
@@ -100,11 +105,46 @@ def test_age_counts_and_not_the_clock(network: Network, monkeypatch: pytest.Monk
 def test_a_newer_node_does_not_follow_the_older_into_its_end(network: Network) -> None:
     """The clock of its machine is behind, and the older one, which has ended, does not respond."""
     king, elsewhere = network.node("king"), network.session()
+    namesakes = king.context.graph.follow_processes("/king")
     later = king.process.started + 3600 * 10**9
     old = ProcessToken(king.context.domain, elsewhere.zid, 1, later, 7, "afar", "/king")
-    assert not control._is_newer(king, old)
+    assert not control._is_newer(king, namesakes, old)
     token = elsewhere.token(format_process(old))
     eventually(lambda: king.is_shutdown, "the end, as the time in the token of the other counts")
+    token.close()
+    namesakes.close()
+
+
+def test_a_node_that_queries_reach_later_than_its_token_arrives(
+    network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is newer, though the clock of its machine is behind."""
+    monkeypatch.setattr(control, "_ATTEMPTS", 10**9)
+    king, elsewhere = network.node("king"), network.session()
+    asked = threading.Event()
+    get = king.context.session.get
+
+    def note(key: str, **options: Any) -> list[Reply]:
+        replies = get(key, **options)
+        asked.set()
+        return replies
+
+    monkeypatch.setattr(king.context.session, "get", note)
+    earlier = king.process.started - 3600 * 10**9
+    new = ProcessToken(king.context.domain, elsewhere.zid, 1, earlier, 7, "afar", "/king")
+    token = elsewhere.token(format_process(new))
+    assert asked.wait(TIMEOUT)
+    assert not king.is_shutdown
+    key = control.control_key(new.domain, new.zid, new.node_id)
+    info = NodeInfo("/king", 7, "afar", [], earlier, age=-10.0)
+
+    def respond(query: Query) -> None:
+        with query:
+            query.reply(key, msgspec.msgpack.encode(info))
+
+    queryable = elsewhere.queryable(key, respond)
+    eventually(lambda: king.is_shutdown, "the older one is shut down")
+    queryable.close()
     token.close()
 
 
@@ -122,7 +162,7 @@ def test_duplicates_take_few_threads(network: Network, monkeypatch: pytest.Monke
     go_on = threading.Event()
     asked: SimpleQueue[int] = SimpleQueue()
 
-    def slowly(_node: Node, other: ProcessToken) -> bool:
+    def slowly(_node: Node, _namesakes: Followed, other: ProcessToken) -> bool:
         asked.put(other.node_id)
         assert go_on.wait(TIMEOUT)
         return False
