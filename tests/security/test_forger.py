@@ -130,12 +130,18 @@ def test_a_plain_client_gets_no_further(pair: tuple[Host, Host], authority: Auth
 def test_taking_over_a_node_needs_control(
     pair: tuple[Host, Host], authority: Authority, control: bool
 ) -> None:
-    """A newer node of the same name ends the older one, so that needs permission to end nodes."""
+    """A newer node of the same name ends the older one, so that needs permission to end nodes.
+
+    Its age counts, which the older one asks it for: the clock of its machine is an hour behind.
+    """
     robot, laptop = pair
     rules = f"laptop: {{subscribe: ['/**'], control: {str(control).lower()}}}\n"
     victim = start(robot, authority, rules)
     usurper = laptop.program(
         """
+        import time
+        now = time.time_ns
+        time.time_ns = lambda: now() - 3600 * 10**9
         import rosz
         with rosz.Node("robot"), rosz.Node("witness") as node:
             node.spin()
