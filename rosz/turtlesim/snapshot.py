@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from rosz.errors import NotFoundError, RoszError, TransportError, UsageError, near_miss
+from rosz.errors import NotFoundError, RoszError, TransportError, UsageError, WaitTimeout, near_miss
 from rosz.wire import own_key
 from rosz.worker import Worker
 
@@ -65,6 +65,7 @@ def fetch(session: Session, domain: int, node: str = "") -> Snapshot:
     Raises:
         NotFoundError: There is no simulator, or none of that name.
         UsageError: There are several, and no name is given.
+        WaitTimeout: A simulator runs, but did not respond in time.
         RoszError: A reply is damaged.
     """
     replies = session.get(own_key(domain, "picture", "*", "*"), timeout=_TIMEOUT)
@@ -75,6 +76,8 @@ def fetch(session: Session, domain: int, node: str = "") -> Snapshot:
     names = sorted(picture.node for picture in pictures)
     if node:
         pictures = [picture for picture in pictures if picture.node == node]
+    if replies and not names:
+        raise WaitTimeout("picture", _TIMEOUT, "a turtlesim runs, but does not respond")
     if not names:
         raise NotFoundError("no turtlesim is running: start 'rosz run turtlesim turtlesim_node'")
     if not pictures:

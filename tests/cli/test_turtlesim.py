@@ -6,7 +6,10 @@ import sys
 import pytest
 from network import Network
 
+from rosz.session import Query
+from rosz.turtlesim import snapshot
 from rosz.turtlesim.simulator import Simulator
+from rosz.wire import own_key
 
 from .shell import Shell
 
@@ -52,3 +55,20 @@ def test_no_turtlesim_runs(shell: Shell, network: Network) -> None:
     result = shell("turtlesim", "snapshot", "field.png")
     assert result.code == 1
     assert "no turtlesim is running: start 'rosz run turtlesim turtlesim_node'" in result.err
+
+
+def test_a_turtlesim_that_does_not_respond(
+    shell: Shell, network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(snapshot, "_TIMEOUT", 0.5)
+    session = network.node("turtlesim").context.session
+    waiting: list[Query] = []
+    queryable = session.queryable(
+        own_key(network.domain, "picture", session.zid, "1"), waiting.append
+    )
+    result = shell("turtlesim", "snapshot", "field.png")
+    assert result.code == 1
+    assert "no picture within 0.5 s; a turtlesim runs, but does not respond" in result.err
+    queryable.close()
+    for query in waiting:
+        query.close()
