@@ -34,8 +34,10 @@ from rosz.msgs.std_srvs.srv import SetBool
 from rosz.msgs.type_description_interfaces.srv import GetTypeDescription
 from rosz.node import Client, Node
 from rosz.node.ros2 import detector, parameters, remote
+from rosz.node.ros2.events import ParameterEvents
 from rosz.node.ros2.values import from_ros2, to_ros2
 from rosz.params import DELETED
+from rosz.params.replica import Changed
 from rosz.qos import PARAMETERS
 from rosz.wire import Kind, Token, format_token
 
@@ -409,6 +411,24 @@ def test_events_of_calls(asker: Node, talker: Node) -> None:
     assert all(each.successful for each in put([number("a", 2), number("b", 3)]).results)
     assert next_event(events, "/robot/talker") == [{}, {"a": 2}, {}]
     assert next_event(events, "/robot/talker") == [{"b": 3}, {}, {}]
+
+
+def test_a_busy_process_has_one_event_for_each_call(
+    asker: Node, talker: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    note = ParameterEvents._changed
+
+    def note_late(events: ParameterEvents, change: Changed) -> None:
+        time.sleep(0.02)  # other threads run for so long
+        note(events, change)
+
+    monkeypatch.setattr(ParameterEvents, "_changed", note_late)
+    events = subscribe_events(asker)
+    asker.context.graph.wait_for(
+        lambda view: len(view.publishers(EVENTS)) == 2, TIMEOUT, "the publishers"
+    )
+    talker.params.update({"~a": 1, "~b": 2, "~c": 3})
+    assert next_event(events, "/robot/talker") == [{"a": 1, "b": 2, "c": 3}, {}, {}]
 
 
 def test_events_of_the_store(asker: Node, talker: Node) -> None:

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from rosz.params.replica import Changed
 
 _TOPIC = "/parameter_events"
-_GATHER_SECONDS = 0.005
-"""Seconds in which the store tells of all changes that one call has made."""
 _SECOND = 1_000_000_000
 
 
@@ -51,6 +49,7 @@ class ParameterEvents:
         self._worker: Worker[Callable[[], object]] = Worker(f"rosz-events{node.name}")
         with self._lock:  # changes wait until it is known what they change
             self._watch = node.params.watch(node.name, self._changed)
+            self._watch.on_end = self._end_call
             try:
                 top = node.params.get(node.name, None)
                 self._known = dict(_parameters(self._base, top, self._base))
@@ -72,9 +71,10 @@ class ParameterEvents:
     def _changed(self, change: Changed) -> None:
         with self._lock:
             self._changes.append(change)
-            first = len(self._changes) == 1
-        if first:
-            self._worker.later(_GATHER_SECONDS, self._publish_gathered)
+
+    def _end_call(self) -> None:
+        if self._changes:
+            self._worker.submit(self._publish_gathered)
 
     def _publish_gathered(self) -> None:
         with self._lock:

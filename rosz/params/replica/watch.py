@@ -56,12 +56,14 @@ class Watch(Closing):
         name: Global name that is watched, with all names below it.
         path: Path of the name.
         callback: Function called with each change.
+        on_end: Function called after all changes that one write has made.
     """
 
     def __init__(self, owner: Watchers, path: Path, callback: Callback) -> None:
         self.name: str = joined(path)
         self.path = path
         self.callback = callback
+        self.on_end: Callable[[], object] = lambda: None
         self._owner = owner
 
     def close(self) -> None:
@@ -135,6 +137,7 @@ class Watchers:
             for change in _changes_seen(watch.path, tree_change):
                 if watch in self._watches:
                     self._call(watch, change)
+            watch.on_end()
 
     def _call(self, watch: Watch, change: Changed) -> None:
         try:
