@@ -264,6 +264,15 @@ def node() -> Node:
     return state.node
 
 
+def clock() -> Clock:
+    """Return the clock of the node; raise a ROSInitException before ``init_node``."""
+    if state.node is not None:
+        return state.node.clock
+    if state.clock is None:
+        raise ROSInitException("time is not initialized. Have you called init_node()?")
+    return state.clock
+
+
 def unnamed_node() -> Node:
     """Return the node, or before ``init_node`` an anonymous node that can call services."""
     if state.node is not None:
