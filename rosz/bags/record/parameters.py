@@ -11,6 +11,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosz.bags.bag import Channel
+from rosz.bags.messages import described
 from rosz.bags.record.recording import BagFiles, Sink
 from rosz.errors import BagError, ClosedError, NoReplica, RoszError
 from rosz.lifecycle import Closable, Closing
@@ -48,14 +49,7 @@ class ParameterRecord(Closing):
         self._follower: Follower | None = None
         self._parts: list[Closable] = []
         cls = ParameterEvent
-        self._channel = Channel(
-            _TOPIC,
-            cls._type_name,
-            definition=cls._full_text,
-            md5=cls._md5sum,
-            type_hash=cls._type_hash,
-            qos=(PARAMETERS,),
-        )
+        self._channel = Channel(_TOPIC, cls._type_name, qos=(PARAMETERS,), **described(cls))
         self._track = sink.track(self._channel, node.context.types)
         self._worker: Worker[Callable[[], object]] = Worker("rosz-bag-parameters")
         self._worker.submit(self._connect)
