@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         format_delay,
         format_rate,
         format_rates,
+        rate_table,
         read_stamp,
     )
     from rosz.introspect.nodes import (
