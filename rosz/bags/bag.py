@@ -20,6 +20,7 @@ from typing import Any, Literal, NoReturn, Protocol, Self, TypeAlias, TypeVar
 import msgspec
 
 from rosz.errors import BagError, UsageError
+from rosz.lifecycle import Closable
 from rosz.qos import QoS
 
 T = TypeVar("T")
@@ -191,12 +192,30 @@ def refuse_damage(error: BagError) -> NoReturn:
     raise error
 
 
-class BagReader(Protocol):
-    """A bag that is read by its index, lazily.
+class OpenBag(Closable, Protocol):
+    """A bag that is open.
 
     Attributes:
         path: The file or folder.
         format: ``mcap``, ``rosbag`` (ROS 1) or ``rosbag2``.
+    """
+
+    path: Path
+    format: str
+
+    @property
+    def size(self) -> int:
+        """Size in bytes; in a bag that is written, with those that wait for the disk."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *exc_info: object) -> None: ...
+
+
+class BagReader(OpenBag, Protocol):
+    """A bag that is read by its index, lazily.
+
+    Attributes:
         version: Version of the format, such as ``2.0``; empty if it has none.
         indexed: Whether the bag has its index. Without one, as after a recorder was killed, the
             index is made by reading through the file.
@@ -204,16 +223,10 @@ class BagReader(Protocol):
         end: Stamp of the latest message; 0 in a bag without messages.
     """
 
-    path: Path
-    format: str
     version: str
     indexed: bool
     start: int
     end: int
-
-    @property
-    def size(self) -> int:
-        """Size in bytes."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -264,28 +277,9 @@ class BagReader(Protocol):
             BagError: A part of the file is damaged.
         """
 
-    def close(self) -> None:
-        """Close the file; a second call has no effect."""
 
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *exc_info: object) -> None: ...
-
-
-class BagWriter(Protocol):
-    """A bag that is written.
-
-    Attributes:
-        path: The file or folder.
-        format: ``mcap``, ``rosbag`` (ROS 1) or ``rosbag2``.
-    """
-
-    path: Path
-    format: str
-
-    @property
-    def size(self) -> int:
-        """Bytes written so far, and those that wait for the disk."""
+class BagWriter(OpenBag, Protocol):
+    """A bag that is written."""
 
     def add(self, channel: Channel) -> int:
         """Add a channel; one that equals an earlier one is the same.
@@ -340,7 +334,3 @@ class BagWriter(Protocol):
         Raises:
             BagError: The file cannot be written.
         """
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *exc_info: object) -> None: ...

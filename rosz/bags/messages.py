@@ -42,6 +42,11 @@ def class_of(channel: Channel, types: TypeStore) -> type[Message]:
     return types.message(channel.type)
 
 
+def described(cls: type[Message]) -> dict[str, Any]:
+    """Return the attributes of a channel that describe the class of its messages."""
+    return {"definition": cls._full_text, "md5": cls._md5sum, "type_hash": cls._type_hash}
+
+
 def decoder_of(channel: Channel, types: TypeStore) -> Callable[[Payload], Message]:
     """Return the function that makes messages of a channel's payloads.
 
@@ -222,13 +227,7 @@ class BagOutput(Closing):
         cls = type(message)
         handle = self._handles.get((topic, cls))
         if handle is None:
-            channel = Channel(
-                topic,
-                cls._type_name,
-                definition=cls._full_text,
-                md5=cls._md5sum,
-                type_hash=cls._type_hash,
-            )
+            channel = Channel(topic, cls._type_name, **described(cls))
             if self._to_ros1 is not None:
                 channel = self._to_ros1(channel)
             handle = self._handles[topic, cls] = self.writer.add(channel)

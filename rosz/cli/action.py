@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json_line, print_lines, print_result, until_stopped
 from rosz.cli.declare import Argument, Json, Option, seconds, values_last
-from rosz.errors import EncodeError, GoalFailed
+from rosz.errors import GoalFailed
 
 if TYPE_CHECKING:
     from rosz.actions import ActionClient, GoalState
@@ -99,7 +98,7 @@ def send_command(
     """
     seconds("--timeout", timeout)
     from rosz.actions import GoalState, action_type, view_of_action, wait_for_action
-    from rosz.introspect import read_arguments
+    from rosz.introspect import listing_arguments, make_message, read_arguments
     from rosz.message import to_jsonable  # noqa: F401  # used later; Ctrl-C must not interrupt an import
     from rosz.node import Node
 
@@ -112,18 +111,10 @@ def send_command(
         with Node("rosz_action", anonymous=True, context=context) as node:
             kind = action_type(node, view, name)
             with node.action_client(name, kind) as client:
-                goal = _make_goal(kind.Goal, arguments)
+                with listing_arguments(kind.Goal):
+                    goal = make_message(kind.Goal, arguments, time.time_ns())
                 state = _send(client, goal, timeout, feedback=feedback, as_json=json)
     return int(state is not GoalState.SUCCEEDED)
-
-
-def _make_goal(goal_type: type[Any], arguments: Sequence[Any]) -> Any:
-    from rosz.introspect import make_message, with_arguments
-
-    try:
-        return make_message(goal_type, arguments, time.time_ns())
-    except EncodeError as error:
-        raise with_arguments(error, goal_type) from error
 
 
 def _printer(as_json: bool) -> Any:

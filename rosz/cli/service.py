@@ -12,7 +12,7 @@ from rosz.cli import suggest
 from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_json, print_lines, print_result, until_stopped, warn
 from rosz.cli.declare import Argument, Json, Option, seconds, values_last
-from rosz.errors import EncodeError, RoszError, UsageError
+from rosz.errors import RoszError, UsageError
 from rosz.names import short_type
 
 if TYPE_CHECKING:
@@ -195,13 +195,11 @@ def _requests(arguments: list[Any], request_type: Any) -> Iterable[list[Any]]:
 
 
 def _send(client: Client, values: Sequence[Any], *, verbose: bool, as_json: bool) -> None:
-    from rosz.introspect import call_service, with_arguments
+    from rosz.introspect import call_service, listing_arguments
     from rosz.message import to_jsonable
 
-    try:
+    with listing_arguments(client.service_type.Request):
         request, response = call_service(client, values, time.time_ns())
-    except EncodeError as error:
-        raise with_arguments(error, client.service_type.Request) from error
     if as_json:
         row = to_jsonable(response)
         print_json({"request": to_jsonable(request), "response": row} if verbose else row)

@@ -22,7 +22,7 @@ from rosz.cli.console import (
     warn,
 )
 from rosz.cli.declare import Argument, Json, Option, at_least, per_second
-from rosz.errors import EncodeError, NotFoundError, UsageError
+from rosz.errors import NotFoundError, UsageError
 
 if TYPE_CHECKING:
     from rosz.introspect import EchoOptions, Filter, Target, Topic
@@ -439,7 +439,7 @@ def _publish(
     arguments: list[Any],
     documents: Iterable[Any] | None,
 ) -> None:
-    from rosz.introspect import DEFAULT_RATE, Sender, SendOptions, with_arguments
+    from rosz.introspect import DEFAULT_RATE, Sender, SendOptions, listing_arguments
     from rosz.node import Node
 
     rate, latched = options.rate, options.rate is None or options.latch
@@ -455,11 +455,9 @@ def _publish(
     with Node(_TOOL, anonymous=True, context=context) as node:
         publisher = node.publisher(topic, cls, latch=latched, queue_size=100)
         sender = Sender(node, publisher, how, lambda line: print_lines([line]))
-        try:
+        with listing_arguments(cls):
             if documents is None:
                 sender.send(arguments)
             else:
                 only_one = isinstance(documents, list) and len(documents) == 1
                 sender.send_documents(documents, only_one=only_one)
-        except EncodeError as error:
-            raise with_arguments(error, cls) from error

@@ -15,11 +15,11 @@ TYPE_CHECKING = False  # typing takes longer to import than everything else here
 if TYPE_CHECKING:
     from rosz.introspect.arguments import (
         list_arguments,
+        listing_arguments,
         make_message,
         read_arguments,
         read_file,
         read_stream,
-        with_arguments,
     )
     from rosz.introspect.connect import command_config, find_unreached, open_context, open_session
     from rosz.introspect.definitions import Definitions
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         format_delay,
         format_rate,
         format_rates,
+        rate_table,
         read_stamp,
     )
     from rosz.introspect.nodes import (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -113,13 +114,17 @@ def list_arguments(cls: type[Any]) -> str:
     return " ".join(_arguments(cls, ""))
 
 
-def with_arguments(error: EncodeError, cls: type[Any]) -> EncodeError:
-    """Return an error that also lists the values of a message, unless it lists them already."""
-    if not error.field and list_arguments(cls) == " ".join(cls.__slots__):
-        return error
-    between = " " if error.reason.endswith("?") else "; "
-    reason = f"{error.reason}{between}the values are: [{list_arguments(cls)}]"
-    return EncodeError(error.type_name, error.field, reason)
+@contextmanager
+def listing_arguments(cls: type[Any]) -> Iterator[None]:
+    """Let the errors of a message list its values, unless they list them already."""
+    try:
+        yield
+    except EncodeError as error:
+        if not error.field and list_arguments(cls) == " ".join(cls.__slots__):
+            raise
+        between = " " if error.reason.endswith("?") else "; "
+        reason = f"{error.reason}{between}the values are: [{list_arguments(cls)}]"
+        raise EncodeError(error.type_name, error.field, reason) from error
 
 
 def _arguments(cls: type[Any], prefix: str) -> list[str]:

@@ -6,7 +6,7 @@ One thread adds messages to a meter while another one reads its statistics.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import sqrt
 from struct import Struct
 
@@ -226,8 +226,11 @@ def format_rates(rates: Mapping[str, RateStats | None]) -> str:
         for name, s in rates.items()
         if s is not None
     ]
-    if not rows:
-        return "no new messages"
+    return rate_table(rows) if rows else "no new messages"
+
+
+def rate_table(rows: Sequence[tuple[str, ...]]) -> str:
+    """Return a table of topics, and of the texts of their rates."""
     widths = [max(map(len, column)) for column in zip(_COLUMNS, *rows, strict=True)]
     head = "   ".join(map(str.center, _COLUMNS, widths))
     body = ["   ".join(map(str.ljust, row, widths)) for row in rows]

@@ -18,7 +18,7 @@ from rosz.names import is_of_action, short_type
 from rosz.wire import Kind, Token, tokens_key
 
 if TYPE_CHECKING:
-    from rosz.node import NodeInfo, Request
+    from rosz.node import NodeInfo
     from rosz.session import Session
 
 PING_TIMEOUT = 3.0
@@ -147,24 +147,26 @@ def nodes_on_machine(nodes: Iterable[NodeEntry], machine: str) -> list[str]:
     return here
 
 
-def query_node(session: Session, node: Token, request: Request, reply_type: type[T]) -> T:
+def query_node(session: Session, node: Token, action: str, reply_type: type[T], **fields: str) -> T:
     """Send a request to a rosz node and return its reply.
 
     Args:
         session: The session to send it on.
         node: One of the node's tokens.
-        request: The request.
+        action: Name of the request.
         reply_type: Type of the reply.
+        fields: Further fields of the request.
 
     Raises:
         NotFoundError: Nothing replies: it is not a rosz node, or has just ended.
         WaitTimeout: The node does not reply in time.
         RoszError: The node refuses, or its reply cannot be decoded; the text says why.
     """
-    from rosz.node import control_key
+    from rosz.node import Request, control_key
 
     key = control_key(node.domain, node.zid, node.node_id)
-    replies = session.get(key, payload=msgspec.msgpack.encode(request), timeout=PING_TIMEOUT)
+    payload = msgspec.msgpack.encode(Request(action, **fields))
+    replies = session.get(key, payload=payload, timeout=PING_TIMEOUT)
     if not replies:
         raise NotFoundError(
             f"node '{node.node_name}' does not take requests: it is not a rosz node"
@@ -187,9 +189,9 @@ def query_node(session: Session, node: Token, request: Request, reply_type: type
 
 def get_info(session: Session, node: Token) -> NodeInfo:
     """Return the information that a node gives of itself; errors as those of `query_node`."""
-    from rosz.node import NodeInfo, Request
+    from rosz.node import NodeInfo
 
-    return query_node(session, node, Request("info"), NodeInfo)
+    return query_node(session, node, "info", NodeInfo)
 
 
 def ping(session: Session, node: Token) -> float:
@@ -227,8 +229,6 @@ def kill(session: Session, node: Token, reason: str) -> None:
         WaitTimeout: The node does not reply, or replies and stays.
         RoszError: The node refuses.
     """
-    from rosz.node import Request
-
     gone = threading.Event()
     prefix = f"{tokens_key(node.domain, node.zid).removesuffix('**')}{node.node_id}/"
 
@@ -238,7 +238,7 @@ def kill(session: Session, node: Token, reason: str) -> None:
 
     watch = session.watch_tokens(f"{prefix}{node.node_id}/NN/**", changed)
     try:
-        query_node(session, node, Request("shutdown", reason=reason), bool)
+        query_node(session, node, "shutdown", bool, reason=reason)
         if not gone.wait(_KILL_TIMEOUT):
             raise WaitTimeout(
                 f"end of node '{node.node_name}'",
@@ -272,20 +272,14 @@ def kill_nodes(
 
 def get_levels(session: Session, node: Token) -> dict[str, str]:
     """Return the loggers of a node with their levels; errors as those of `query_node`."""
-    from rosz.node import Request
-
-    return query_node(session, node, Request("levels"), dict[str, str])
+    return query_node(session, node, "levels", dict[str, str])
 
 
 def set_level(session: Session, node: Token, logger: str, level: str) -> None:
     """Set the level of a logger of a node; errors as those of `query_node`."""
-    from rosz.node import Request
-
-    query_node(session, node, Request("set_level", logger=logger, level=level), bool)
+    query_node(session, node, "set_level", bool, logger=logger, level=level)
 
 
 def follow_clock(session: Session, node: Token) -> None:
     """Let a node look at its ``use_sim_time`` again; errors as those of `query_node`."""
-    from rosz.node import Request
-
-    query_node(session, node, Request("follow_clock"), bool)
+    query_node(session, node, "follow_clock", bool)

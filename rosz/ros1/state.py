@@ -178,6 +178,13 @@ def set_arguments(argv: Sequence[str]) -> None:
             state.context.arguments = state.arguments
 
 
+def find_option(options: str | tuple[str, ...], argv: Sequence[str] | None = None) -> str | None:
+    """Return the value of the first of some options, such as ``__ns:=``, or None."""
+    words = (word for word in (sys.argv if argv is None else argv) if word.startswith(options))
+    first = next(words, None)
+    return None if first is None else first.partition(":=")[2]
+
+
 def context() -> Context:
     """Return the context of the process, opened on first use and closed at exit.
 
@@ -262,6 +269,15 @@ def node() -> Node:
     if state.node is None:
         raise ROSInitException(NO_NODE)
     return state.node
+
+
+def clock() -> Clock:
+    """Return the clock of the node; raise a ROSInitException before ``init_node``."""
+    if state.node is not None:
+        return state.node.clock
+    if state.clock is None:
+        raise ROSInitException("time is not initialized. Have you called init_node()?")
+    return state.clock
 
 
 def unnamed_node() -> Node:

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from rosz import names
 from rosz.bags.bag import Channel, Entry, FileErrors
 from rosz.errors import NotFoundError, UsageError
 from rosz.introspect import FieldPath, Loader, find_target
@@ -99,7 +100,7 @@ def find_curves(
 
 
 def _curves(name: str, topics: Mapping[str, Sequence[str]], load: Loader) -> list[Curve]:
-    target = find_target(name if name.startswith("/") else f"/{name}", topics, load)
+    target = find_target(names.join("/", name), topics, load)
     cls = load(target.type_name)
     kind = target.path.type_in(cls)
     if kind.partition("[")[0] in _NUMBERS:

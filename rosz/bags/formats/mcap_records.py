@@ -17,6 +17,7 @@ from rosz.bags.bag import Channel, Compression, Payload, compression_library
 from rosz.bags.formats import channel_text
 from rosz.bags.formats.chunks import ChunkError, unpack
 from rosz.errors import RoszError
+from rosz.idl import full_name
 from rosz.qos import LATCHED
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -221,7 +222,7 @@ def parse_channel(body: Payload, schemas: Mapping[int, Schema]) -> tuple[int, Ch
         qos = (LATCHED,)
     return number, Channel(
         topic=topic,
-        type=about.get(_EVENT) or _ros2_name(schema.name),
+        type=about.get(_EVENT) or full_name(schema.name, "msg"),
         encoding=encoding,
         definition=schema.data.decode("utf-8", "surrogateescape"),
         md5=about.get("md5sum", ""),
@@ -230,11 +231,6 @@ def parse_channel(body: Payload, schemas: Mapping[int, Schema]) -> tuple[int, Ch
         node=about.get("callerid", ""),
         language="" if schema.encoding == _LANGUAGES.get(encoding) else schema.encoding,
     )
-
-
-def _ros2_name(name: str) -> str:
-    package, _, base = name.partition("/")
-    return name if "/" in base or not base else f"{package}/msg/{base}"
 
 
 # Compression.

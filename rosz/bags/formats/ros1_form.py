@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from rosz.bags.bag import Channel, Payload
-from rosz.bags.messages import class_of
+from rosz.bags.messages import class_of, described
 from rosz.idl import parse_message
 from rosz.message import Message, ros1_fields
 from rosz.typestore import TypeStore
@@ -64,14 +64,7 @@ def to_cdr(channel: Channel, types: TypeStore) -> tuple[Channel, Callable[[Paylo
     if channel.encoding != "ros1":
         return channel, bytes
     cls = class_of(channel, types)
-    form = msgspec.structs.replace(
-        channel,
-        encoding="cdr",
-        definition=cls._full_text,
-        md5=cls._md5sum,
-        type_hash=cls._type_hash,
-        language="",
-    )
+    form = msgspec.structs.replace(channel, encoding="cdr", language="", **described(cls))
     return form, lambda data: cls.from_ros1(data).to_cdr()
 
 

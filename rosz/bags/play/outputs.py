@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import msgspec
 
+from rosz import names
 from rosz.bags.bag import BagReader, Channel, Entry
 from rosz.bags.edit.migrate import Conversion, find_conversion
 from rosz.bags.play.options import PlayOptions
@@ -55,18 +56,19 @@ class Outputs:
         self.problems: int = 0
         self.publishers: dict[Any, Publisher[Any]] = {}
         self.pausing: set[str] = set()
+        self._pause_topics = {names.join("/", name) for name in options.pause_topics}
         self.topics: set[str] = self._choose(
             {channel.topic for reader in readers for channel in reader.channels}
         )
 
     def _choose(self, topics: set[str]) -> set[str]:
-        wanted = {_absolute(name) for name in self._options.topics}
+        wanted = {names.join("/", name) for name in self._options.topics}
         missing = sorted(wanted - topics)
         if missing:
             self.report(
                 f"no topic '{missing[0]}' in the bags; they have {', '.join(sorted(topics))}"
             )
-        for name in sorted(set(map(_absolute, self._options.pause_topics)) - topics):
+        for name in sorted(self._pause_topics - topics):
             self._warn(f"no topic '{name}' to pause at in the bags")
         chosen = wanted & topics if wanted else topics
         if self._options.clock and _CLOCK in chosen:
@@ -105,7 +107,7 @@ class Outputs:
             express = not self._options.immediate
             made = Publisher(self._node, name, cls, self._qos(channel), waits=True, express=express)
             self.publishers[key] = self._node.keep(made)
-            if channel.topic in map(_absolute, self._options.pause_topics):
+            if channel.topic in self._pause_topics:
                 self.pausing.add(made.name)
         return Output(channel, self.publishers[key], conversion)
 
@@ -138,7 +140,3 @@ class Outputs:
         if id(channel) not in self._failed:
             self._failed.add(id(channel))
             self._warn(f"messages of '{channel.topic}' are left out: {error} (told once)")
-
-
-def _absolute(name: str) -> str:
-    return name if name.startswith("/") else f"/{name}"

@@ -6,17 +6,19 @@ Changes are messages of ROS 2's type on ``/parameter_events``, which any tool ca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosz.bags.bag import Channel
+from rosz.bags.messages import described
 from rosz.bags.record.recording import BagFiles, Sink
 from rosz.errors import BagError, ClosedError, NoReplica, RoszError
 from rosz.lifecycle import Closable, Closing
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.rcl_interfaces.msg import Parameter, ParameterEvent
 from rosz.node.ros2 import to_ros2
+from rosz.params import Value, joined, leaves, split
 from rosz.params.replica import ParamClient
 from rosz.qos import PARAMETERS
 from rosz.worker import Worker
@@ -48,14 +50,7 @@ class ParameterRecord(Closing):
         self._follower: Follower | None = None
         self._parts: list[Closable] = []
         cls = ParameterEvent
-        self._channel = Channel(
-            _TOPIC,
-            cls._type_name,
-            definition=cls._full_text,
-            md5=cls._md5sum,
-            type_hash=cls._type_hash,
-            qos=(PARAMETERS,),
-        )
+        self._channel = Channel(_TOPIC, cls._type_name, qos=(PARAMETERS,), **described(cls))
         self._track = sink.track(self._channel, node.context.types)
         self._worker: Worker[Callable[[], object]] = Worker("rosz-bag-parameters")
         self._worker.submit(self._connect)
@@ -89,13 +84,13 @@ class ParameterRecord(Closing):
 
         tree = self._follower.get("/")
         files.add_metadata("parameters", {"yaml": dump(tree)})
-        rows = [Parameter(name, to_ros2(value)) for name, value in _leaves("", tree)]
+        rows = [Parameter(name, to_ros2(value)) for name, value in _leaves("/", tree).items()]
         self._write(files, ParameterEvent(new_parameters=rows), self._node.now())
 
     def _on_change(self, change: Changed) -> None:
         event = ParameterEvent(node="")
-        old = dict(_leaves(change.name.rstrip("/"), change.old))
-        new = dict(_leaves(change.name.rstrip("/"), change.new))
+        old = _leaves(change.name, change.old)
+        new = _leaves(change.name, change.new)
         for name, value in new.items():
             if name not in old:
                 event.new_parameters.append(Parameter(name, to_ros2(value)))
@@ -122,10 +117,6 @@ class ParameterRecord(Closing):
             part.close()
 
 
-def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield full names and values of all parameters below a name that are not dictionaries."""
-    if isinstance(value, dict) and value:
-        for key, below in value.items():
-            yield from _leaves(f"{name}/{key}", below)
-    elif value is not None and value != {}:
-        yield name or "/", value
+def _leaves(name: str, value: Value) -> dict[str, Value]:
+    """Return the parameters at or below a name that are not dictionaries, by full names."""
+    return {joined(path): leaf for path, leaf in leaves(value, split(name)) if leaf is not None}

@@ -25,6 +25,7 @@ from rosz.bridges.foxglove.protocol import (
 )
 from rosz.errors import NotFoundError, RoszError, UsageError
 from rosz.node import Node
+from rosz.params import joined, leaves, split
 from rosz.params.replica import Changed, Watch
 from rosz.worker import Worker
 
@@ -135,8 +136,8 @@ class ClientParameters:
         self._worker.submit(partial(self._report, change))
 
     def _report(self, change: Changed) -> None:
-        leaves = {*_leaves(change.name, change.old), *_leaves(change.name, change.new)}
-        shown = {name for name in leaves if not self._policy.objection("get", name)}
+        changed = {*_leaves(change.name, change.old), *_leaves(change.name, change.new)}
+        shown = {name for name in changed if not self._policy.objection("get", name)}
         for member, followed in self._followed.items():
             names = {name for name in followed if self._is_in(name, change.name)}
             if _ALL in followed:
@@ -154,11 +155,7 @@ class ClientParameters:
 
 def _leaves(name: str, value: Any) -> list[str]:
     """Return the names of the parameters in a value."""
-    if not isinstance(value, dict):
-        return [] if value is None else [name]
-    return [
-        leaf for key, below in value.items() for leaf in _leaves(f"{name.rstrip('/')}/{key}", below)
-    ]
+    return [joined(path) for path, leaf in leaves(value, split(name)) if leaf is not None]
 
 
 def _with_value(parameters: Iterable[FoxgloveParameter]) -> list[FoxgloveParameter]:

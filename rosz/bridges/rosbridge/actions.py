@@ -13,7 +13,7 @@ from rosz.actions import ActionClient, ActionServer, ClientGoal, GoalState, Serv
 from rosz.bridges.clients import build
 from rosz.bridges.rosbridge import operations as ops
 from rosz.bridges.rosbridge.plain import Spelling, converter
-from rosz.bridges.rosbridge.state import ClientState
+from rosz.bridges.rosbridge.state import ClientState, Served
 from rosz.errors import ActionError, RoszError, UsageError
 
 
@@ -132,14 +132,11 @@ class SentGoals:
             client.close()
 
 
-class ServedActions:
+class ServedActions(Served[ActionServer]):
     """The actions that one client serves."""
 
     def __init__(self, state: ClientState) -> None:
-        self._state = state
-        self._node = state.shared.node
-        self._lock = threading.Lock()
-        self._servers: dict[str, ActionServer] = {}
+        super().__init__(state)
         self._goals: dict[str, tuple[ServerGoal, Any, Future[ops.ActionResult]]] = {}
 
     def advertise(self, operation: ops.AdvertiseAction) -> None:
@@ -150,9 +147,7 @@ class ServedActions:
         """
         spelling = self._state.spelling_of(operation.type)
         name = self._node.resolve(operation.action)
-        self._state.shared.policy.check("serve", name)
-        if name not in self._servers:
-            self._state.shared.limits.check("services", len(self._servers))
+        self._check(name)
         kind = self._node.context.types.action(operation.type)
         execute = partial(self._execute, name, operation.type, kind, spelling)
 
@@ -221,18 +216,7 @@ class ServedActions:
 
     def unadvertise(self, operation: ops.UnadvertiseAction) -> None:
         """Serve an action no longer."""
-        name = self._node.resolve(operation.action)
-        if not self._end_server(name):
-            text = f"unadvertise_action: '{name}' is not served"
-            self._state.report("warning", text, operation.id)
-
-    def _end_server(self, name: str) -> bool:
-        """End the server of an action; return whether there was one."""
-        with self._lock:
-            server = self._servers.pop(name, None)
-        if server is not None:
-            server.close()
-        return server is not None
+        self._withdraw(operation, operation.action)
 
     def close(self) -> None:
         """End all actions; their goals are aborted."""

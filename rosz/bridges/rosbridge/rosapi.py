@@ -19,6 +19,7 @@ from rosz.bridges.clients import build
 from rosz.bridges.rosbridge.plain import Plain, Spelling, converter
 from rosz.errors import NotFoundError, RoszError, UsageError
 from rosz.graph import View
+from rosz.idl import full_name
 from rosz.introspect import services_of_type
 from rosz.message import Message, Service, shown_name, slot_type, slots
 from rosz.msgs.builtin_interfaces.msg import Time
@@ -284,10 +285,7 @@ def _from_json(name: str, text: str) -> Any:
 
 def _spelt(type_name: str, spelling: Spelling) -> str:
     """Return the name of a type in a spelling."""
-    if spelling == "ros1" or type_name.count("/") > 1:
-        return short_type(type_name) if spelling == "ros1" else type_name
-    package, _, name = type_name.partition("/")
-    return f"{package}/msg/{name}"
+    return short_type(type_name) if spelling == "ros1" else full_name(type_name, "msg")
 
 
 def _nodes_of(tokens: Iterable[Any]) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Any
 from rosz.bridges.clients import build
 from rosz.bridges.rosbridge import operations as ops
 from rosz.bridges.rosbridge.plain import Spelling, converter
-from rosz.bridges.rosbridge.state import ClientState
+from rosz.bridges.rosbridge.state import ClientState, Served
 from rosz.errors import NotFoundError, RoszError, ServiceError, UsageError, near_miss
 from rosz.node import Client, Service
 from rosz.node.ros2 import request_type
@@ -92,15 +92,12 @@ class ServiceCalls:
             client.close()
 
 
-class ServedServices:
+class ServedServices(Served[Service]):
     """The services that one client serves."""
 
     def __init__(self, state: ClientState) -> None:
-        self._state = state
-        self._node = state.shared.node
+        super().__init__(state)
         self._numbers = itertools.count(1)
-        self._lock = threading.Lock()
-        self._services: dict[str, Service] = {}
         self._pending: dict[str, Future[ops.ServiceResponse]] = {}
 
     def advertise(self, operation: ops.AdvertiseService) -> None:
@@ -111,18 +108,16 @@ class ServedServices:
         """
         spelling = self._state.spelling_of(operation.type)
         name = self._node.resolve(operation.service)
-        self._state.shared.policy.check("serve", name)
-        if name not in self._services:
-            self._state.shared.limits.check("services", len(self._services))
+        self._check(name)
         kind = self._node.context.types.service(operation.type)
 
         def handle(request: Any) -> Any:
             return self._query(name, operation.type, kind, request, spelling)
 
-        self._end_service(name)
+        self._end_server(name)
         service = self._node.service(name, kind, handle)
         with self._lock:
-            self._services[name] = service
+            self._servers[name] = service
 
     def _query(self, name: str, type_name: str, kind: Any, request: Any, spelling: Spelling) -> Any:
         number = f"service_request:{name}:{next(self._numbers)}"
@@ -160,24 +155,13 @@ class ServedServices:
 
     def unadvertise(self, operation: ops.UnadvertiseService) -> None:
         """Serve a service no longer."""
-        name = self._node.resolve(operation.service)
-        if not self._end_service(name):
-            text = f"unadvertise_service: '{name}' is not served"
-            self._state.report("warning", text, operation.id)
-
-    def _end_service(self, name: str) -> bool:
-        """End a service; return whether the client served it."""
-        with self._lock:
-            service = self._services.pop(name, None)
-        if service is not None:
-            service.close()
-        return service is not None
+        self._withdraw(operation, operation.service)
 
     def close(self) -> None:
         """End all services; those who wait for answers learn it."""
         with self._lock:
-            services, pending = list(self._services.values()), list(self._pending.values())
-            self._services.clear()
+            services, pending = list(self._servers.values()), list(self._pending.values())
+            self._servers.clear()
             self._pending.clear()
         for answer in pending:
             answer.set_exception(ServiceError("the client that serves it has left"))

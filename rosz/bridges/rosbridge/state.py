@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import threading
-from typing import Any, Literal, TypeAlias
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 import msgspec
 
@@ -12,11 +12,14 @@ from rosz.access import AccessPolicy
 from rosz.actions import SEND, TopicGateway
 from rosz.bridges.clients import ClientLimits, ClientTasks, ClientTopics, OutgoingQueue, Task
 from rosz.bridges.rosbridge.encoded import EncodedMessage
-from rosz.bridges.rosbridge.operations import SetLevel, fragments
+from rosz.bridges.rosbridge.operations import Operation, SetLevel, fragments
 from rosz.bridges.rosbridge.plain import Spelling
 from rosz.bridges.rosbridge.rosapi import RosApi
+from rosz.lifecycle import Closable
 from rosz.node import Node
 from rosz.worker import Worker
+
+S = TypeVar("S", bound=Closable)
 
 Level: TypeAlias = Literal["info", "warning", "error", "none"]
 """Level of status messages."""
@@ -161,3 +164,34 @@ class ClientState:
         """Forget everything that waits."""
         self.queue.close()
         self._tasks.close()
+
+
+class Served(Generic[S]):
+    """The services, or the actions, that one client serves, by name."""
+
+    def __init__(self, state: ClientState) -> None:
+        self._state = state
+        self._node = state.shared.node
+        self._lock = threading.Lock()
+        self._servers: dict[str, S] = {}
+
+    def _check(self, name: str) -> None:
+        """Check that the client may serve a name, and one more; raise a RoszError if not."""
+        self._state.shared.policy.check("serve", name)
+        if name not in self._servers:
+            self._state.shared.limits.check("services", len(self._servers))
+
+    def _withdraw(self, operation: Operation, name: str) -> None:
+        """Serve a name no longer, as an operation says."""
+        full_name = self._node.resolve(name)
+        if not self._end_server(full_name):
+            text = f"{operation.__struct_config__.tag}: '{full_name}' is not served"
+            self._state.report("warning", text, operation.id)
+
+    def _end_server(self, name: str) -> bool:
+        """End a server; return whether there was one."""
+        with self._lock:
+            server = self._servers.pop(name, None)
+        if server is not None:
+            server.close()
+        return server is not None

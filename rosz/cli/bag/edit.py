@@ -75,7 +75,7 @@ def filter_command(
     types = call.types
     with open_bags([bag]) as source, _created(output, compression) as writer:
         decode = Bag(source.readers[0], types).decoder
-        transfer = Transfer(writer, types, source.problems.report)
+        transfer = Transfer(writer, types, source.report)
         for number, entry in enumerate(source.entries(part), 1):
             if condition is not None or shown is not None:
                 topic = entry.channel.topic
@@ -93,7 +93,7 @@ def filter_command(
                     continue
             transfer.write(entry)
     print_lines([f"{output}: {count(transfer.count, 'message')}"])
-    return int(bool(source.problems.count))
+    return int(bool(source.problems))
 
 
 @contextmanager
@@ -183,11 +183,11 @@ def _write(call: Call, bags: Sequence[str], output: str, form: _Form) -> int:
                 writer.add_metadata(name, texts)
             for attachment in reader.attachments():
                 writer.add_attachment(attachment)
-        transfer = Transfer(writer, call.types, source.problems.report)
+        transfer = Transfer(writer, call.types, source.report)
         for entry in source.entries(Part()):
             transfer.write(entry)
     print_lines([f"{output}: {count(transfer.count, 'message')}"])
-    return int(bool(source.problems.count))
+    return int(bool(source.problems))
 
 
 @app.command("split")
@@ -212,11 +212,11 @@ def split_command(
             source.entries(Part()),
             output or (bag if Path(bag).is_file() else f"{bag.rstrip('/')}/"),
             call.types,
-            source.problems.report,
+            source.report,
             seconds=duration,
             size=size << 20,
             compression=_compression(compression),
         )
         for file, number in parts:
             print_lines([f"{file}: {count(number, 'message')}"])
-    return int(bool(source.problems.count))
+    return int(bool(source.problems))

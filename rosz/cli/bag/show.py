@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from msgspec import Struct
 from msgspec.structs import replace
 
+from rosz import names
 from rosz.cli.bag.play import list_topics
 from rosz.cli.bag.source import (
     BagArgument,
@@ -19,7 +20,6 @@ from rosz.cli.bag.source import (
     End,
     Part,
     Start,
-    absolute,
     app,
     check_times,
     open_bags,
@@ -78,7 +78,7 @@ def cat_command(
         entries = source.entries(Part(topics=echoes.topics, start=start, end=end))
         for text in islice(filter(None, map(echoes.text, entries)), limit):
             sys.stdout.write(text)
-    return int(bool(source.problems.count))
+    return int(bool(source.problems))
 
 
 @app.command("export", arrange=list_topics)
@@ -123,7 +123,7 @@ def export_command(
             print_lines(_export_videos(export, fps))
         else:
             print_lines(_export_pictures(export, form))
-    return int(bool(source.problems.count))
+    return int(bool(source.problems))
 
 
 class _Export:
@@ -153,15 +153,15 @@ class _Export:
         types = {channel.topic: channel.type for channel in self.reader.channels}
         channels = (channel for channel in self.reader.channels if channel.type in IMAGE_TYPES)
         images = [*dict.fromkeys(channel.topic for channel in channels)]
-        names = [absolute(topic) for topic in self._part.topics or images]
-        for name in names:
+        topics = [names.join("/", topic) for topic in self._part.topics or images]
+        for name in topics:
             if name in types and name not in images:
                 raise UsageError(f"topic '{name}' has no images, but {types[name]}")
-        if not names:
+        if not topics:
             raise NotFoundError("the bag has no topic with images: no Image, no CompressedImage")
-        self._part = replace(self._part, topics=names)
+        self._part = replace(self._part, topics=topics)
         files = file_names(images)
-        return {topic: self.folder / files[topic] for topic in images if topic in names}
+        return {topic: self.folder / files[topic] for topic in images if topic in topics}
 
     @contextmanager
     def left_out_if_damaged(self, entry: Entry) -> Iterator[None]:
@@ -170,7 +170,7 @@ class _Export:
             yield
         except MessageError as error:
             place = f"message of '{entry.channel.topic}' at {entry.stamp / 1e9:.9f}"
-            self._source.problems.report(f"{place} is left out: {error}")
+            self._source.report(f"{place} is left out: {error}")
 
 
 def _export_tables(export: _Export, form: str) -> list[str]:
@@ -271,9 +271,9 @@ def plot_command(
             if curve.missing:
                 warn(f"{count(curve.missing, 'message')} have no '{curve.label}'")
             elif not curve.lines:
-                source.problems.report(f"no value of '{curve.label}' at that time")
+                source.report(f"no value of '{curve.label}' at that time")
         draw(axes, Path(output), reader.start, title or Path(bag).name)
-    return int(bool(source.problems.count))
+    return int(bool(source.problems))
 
 
 class _Echoes:
@@ -292,7 +292,7 @@ class _Echoes:
         if topic:
             by_type = {channel.type: channel for channel in reader.channels}
             types = {channel.topic: [channel.type] for channel in reader.channels}
-            name = absolute(topic)
+            name = names.join("/", topic)
             target = find_target(name, types, lambda each: class_of(by_type[each], self._types))
             self._path, self.topics = target.path, [target.topic]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from msgspec import Struct
 
+from rosz import names
 from rosz.cli import suggest
 from rosz.cli.call import new_group
 from rosz.cli.console import print_error
@@ -36,24 +37,21 @@ class Part(Struct, frozen=True, kw_only=True):
     end: End = None
 
 
-class Problems:
-    """Prints problems, and counts them."""
+class BagInput:
+    """Bags that are read, and their chosen messages.
 
-    def __init__(self) -> None:
-        self.count = 0
+    Attributes:
+        problems: Number of problems that were printed.
+    """
+
+    def __init__(self, readers: Sequence[BagReader]) -> None:
+        self.readers = readers
+        self.problems = 0
 
     def report(self, problem: BagError | str) -> None:
         """Print a problem."""
-        self.count += 1
+        self.problems += 1
         print_error(f"ERROR: {problem}")
-
-
-class BagInput:
-    """Bags that are read, and their chosen messages."""
-
-    def __init__(self, readers: Sequence[BagReader], problems: Problems) -> None:
-        self.readers = readers
-        self.problems = problems
 
     def entries(self, part: Part) -> Iterator[Entry]:
         """Return the messages of a part, merged by time; its times begin with the first bag.
@@ -64,13 +62,13 @@ class BagInput:
         from rosz.bags.edit import merged
 
         topics = {channel.topic for reader in self.readers for channel in reader.channels}
-        wanted = {absolute(topic) for topic in part.topics or ()}
+        wanted = {names.join("/", topic) for topic in part.topics or ()}
         for topic in sorted(wanted - topics):
             raise NotFoundError(f"no topic '{topic}' in the bag{near_miss(topic, topics)}")
         first = min((reader.start for reader in self.readers if reader.count()), default=0)
         return merged(
             self.readers,
-            self.problems.report,
+            self.report,
             topics=wanted or None,
             start=first + int(part.start * _NS) if part.start else None,
             end=None if part.end is None else first + int(part.end * _NS),
@@ -84,11 +82,6 @@ def compression_of(*, bz2: bool, lz4: bool, zstd: bool) -> Compression | None:
     return "bz2" if bz2 else "lz4" if lz4 else "zstd" if zstd else None
 
 
-def absolute(topic: str) -> str:
-    """Return a name of a topic with the slash before it."""
-    return topic if topic.startswith("/") else f"/{topic}"
-
-
 @contextmanager
 def open_bags(bags: Sequence[str]) -> Iterator[BagInput]:
     """Open bags, and print their damage.
@@ -99,12 +92,11 @@ def open_bags(bags: Sequence[str]) -> Iterator[BagInput]:
     from rosz.bags import open_reader
 
     with ExitStack() as stack:
-        readers = [stack.enter_context(open_reader(bag)) for bag in bags]
-        problems = Problems()
-        for reader in readers:
+        source = BagInput([stack.enter_context(open_reader(bag)) for bag in bags])
+        for reader in source.readers:
             for problem in reader.problems:
-                problems.report(problem)
-        yield BagInput(readers, problems)
+                source.report(problem)
+        yield source
 
 
 def check_times(start: float, end: float | None) -> None:

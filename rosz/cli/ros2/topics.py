@@ -289,32 +289,27 @@ def hz(given: Namespace) -> None:
 
 
 def _rates(meters: dict[str, Any]) -> str | None:
+    from rosz.introspect import format_rate, rate_table
+
     stats = {name: meter.stats() for name, meter in meters.items()}
-    measured = {name: each for name, each in stats.items() if each is not None}
+    measured = {name: _counted(each) for name, each in stats.items() if each is not None}
     if len(meters) == 1:
-        return next((_times("rate", each, each.rate) for each in measured.values()), None)
+        return next(map(format_rate, measured.values()), None)
     rows = [
         (
             name,
             *(f"{value:.3f}" for value in (s.rate, s.min_delta, s.max_delta)),
             f"{s.std_dev:.5f}",
-            str(s.window - 1),
+            str(s.window),
         )
         for name, s in measured.items()
     ]
-    head = ("topic", "rate", "min_delta", "max_delta", "std_dev", "window")
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    top = "   ".join(map(str.center, head, widths))
-    lines = ["   ".join(map(str.ljust, row, widths)) for row in rows]
-    return "\n".join([top, "=" * len(top), *lines, ""]) if rows else None
+    return rate_table(rows) if rows else None
 
 
-def _times(what: str, stats: Any, mean: float) -> str:
-    low, high, deviation, window = msgspec.structs.astuple(stats)[1:]
-    return (
-        f"average {what}: {mean:.3f}\n\tmin: {low:.3f}s max: {high:.3f}s std dev:"
-        f" {deviation:.5f}s window: {window - 1}"
-    )
+def _counted(stats: Any) -> Any:
+    """Return statistics that count the times between messages, as ROS 2 does."""
+    return msgspec.structs.replace(stats, window=stats.window - 1)
 
 
 def bandwidth(given: Namespace) -> None:
@@ -346,7 +341,7 @@ def bandwidth(given: Namespace) -> None:
 
 def delay(given: Namespace) -> None:
     """Print the age of the messages of a topic."""
-    from rosz.introspect import DelayMeter, read_stamp
+    from rosz.introspect import DelayMeter, format_delay, read_stamp
 
     meter = DelayMeter(given.window + 1)
     with open_node(lasting=True) as node:
@@ -361,7 +356,7 @@ def delay(given: Namespace) -> None:
             stats = meter.stats()
             if stats is None:
                 return "no new messages" if meter.begun else None
-            return _times("delay", stats, stats.mean)
+            return format_delay(_counted(stats))
 
         _tap(node, token, add)
         _report(node, text)

@@ -15,17 +15,6 @@ from rosz.transforms import (
     transform_wrench,
 )
 
-__all__ = (
-    "TRANSFORMATIONS",
-    "do_transform_point",
-    "do_transform_pose",
-    "do_transform_vector3",
-    "do_transform_wrench",
-    "from_msg_msg",
-    "to_msg_msg",
-    "transform_to_kdl",
-)
-
 
 def to_msg_msg(msg: Any) -> Any:
     """Return a message, which needs no conversion."""

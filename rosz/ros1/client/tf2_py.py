@@ -166,17 +166,10 @@ class BufferCore:
         return "digraph G {\n" + "".join(lines) + "}"
 
     def _chain(
-        self,
-        target_frame: str,
-        target_time: Any,
-        source_frame: str,
-        source_time: Any,
-        fixed_frame: str,
+        self, target_frame: str, target_time: Any, source_frame: str, *call: Any
     ) -> list[str]:
-        """Return the frames between two frames."""
-        self.lookup_transform_full_core(
-            target_frame, target_time, source_frame, source_time, fixed_frame
-        )
+        """Return the frames between two frames; see `lookup_transform_full_core`."""
+        self.lookup_transform_full_core(target_frame, target_time, source_frame, *call)
         return self.frames.chain(target_frame, source_frame)
 
     def _frameExists(self, frame: str) -> bool:  # noqa: N802  # ROS 1's

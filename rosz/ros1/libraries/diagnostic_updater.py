@@ -244,12 +244,7 @@ class Updater(DiagnosticTaskVector):
 
     def broadcast(self, lvl: int, msg: str) -> None:
         """Publish one summary for all tasks, without running them."""
-        statuses = []
-        for task in self.tasks:
-            status = DiagnosticStatusWrapper(name=task.name)
-            status.summary(lvl, msg)
-            statuses.append(status)
-        self.publish(statuses)
+        self.publish([DiagnosticStatusWrapper(lvl, task.name, str(msg)) for task in self.tasks])
 
     def publish(self, msg: Any) -> None:
         """Publish a status or a list of them, with the name of the node before theirs."""
@@ -262,13 +257,10 @@ class Updater(DiagnosticTaskVector):
 
     def addedTaskCallback(self, task: DiagnosticTaskVector.DiagnosticTaskInternal) -> None:
         """Publish that the node starts."""
-        status = DiagnosticStatusWrapper(name=task.name)
-        status.summary(OK, "Node starting up")
-        self.publish(status)
+        self.publish(DiagnosticStatusWrapper(OK, task.name, "Node starting up"))
 
     def _run(self, task: DiagnosticTaskVector.DiagnosticTaskInternal) -> DiagnosticStatusWrapper:
-        status = DiagnosticStatusWrapper(name=task.name, hardware_id=self.hwid)
-        status.summary(ERROR, "No message was set")
+        status = DiagnosticStatusWrapper(ERROR, task.name, "No message was set", self.hwid)
         task.run(status)
         if self.verbose and status.level:
             rospy.logwarn("%s: level %s, %s", status.name, status.level, status.message)

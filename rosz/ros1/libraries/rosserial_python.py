@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import io
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -55,12 +54,6 @@ def _message_of(info: Any) -> Any:
     return rosserial.check_definition(info, load_message(*info.message_type.split("/")))
 
 
-def _encoded(message: Any) -> bytes:
-    buffer = io.BytesIO()
-    message.serialize(buffer)
-    return buffer.getvalue()
-
-
 class Publisher:
     """Publishes the messages that a device sends.
 
@@ -98,7 +91,7 @@ class Subscriber:
 
     def callback(self, msg: Any) -> None:
         """Send a message to the device."""
-        self.parent.send(self.id, _encoded(msg))
+        self.parent.send(self.id, msg.to_ros1())
 
     def unregister(self) -> None:
         """Unregister from the topic."""
@@ -121,7 +114,7 @@ class ServiceServer:
         self.id = topic_info.topic_id
         self.parent = parent
         srv, self.mreq, self.mres = load_service(*topic_info.message_type.split("/"))
-        self._service = rosserial.DeviceService(lambda _, req: parent.send(self.id, _encoded(req)))
+        self._service = rosserial.DeviceService(lambda _, req: parent.send(self.id, req.to_ros1()))
         self._service.request = rosserial.Half(topic_info, self.mreq)
         self._service.response = rosserial.Half(topic_info, self.mres)
         self.service = rospy.Service(self.topic, srv, self.callback)
@@ -163,7 +156,7 @@ class ServiceClient:
 
     def handlePacket(self, data: bytes) -> None:  # noqa: N802  # ROS 1's name
         """Call the service with a request of the device, and send the response."""
-        self.parent.send(self.id, _encoded(self.proxy(self.mreq().deserialize(data))))
+        self.parent.send(self.id, self.proxy(self.mreq().deserialize(data)).to_ros1())
 
 
 def _handler(topic: int, text: str) -> Callable[[SerialClient, bytes], None]:

@@ -234,24 +234,8 @@ def in_words_of_genpy(message: Any, error: EncodeError) -> EncodeError:
 
 def to_ros1_log(message: Any, topics_of: Callable[[str], Sequence[str]]) -> Any:
     """Convert a ROS 2 log message to ROS 1's, with the topics of its node."""
-    from rosz.msgs.rcl_interfaces.msg import Log as Ros2Log
-    from rosz.msgs.rosgraph_msgs.msg import Log
-    from rosz.msgs.std_msgs.msg import Header
+    from rosz import introspect
 
-    levels = (
-        (Ros2Log.FATAL, Log.FATAL),
-        (Ros2Log.ERROR, Log.ERROR),
-        (Ros2Log.WARN, Log.WARN),
-        (Ros2Log.INFO, Log.INFO),
-    )
-    name = "/" + message.name.lstrip("/").replace(".", "/")
-    return Log(
-        header=Header(stamp=message.stamp),
-        level=next((ours for theirs, ours in levels if message.level >= theirs), Log.DEBUG),
-        name=name,
-        msg=message.msg,
-        file=message.file,
-        function=message.function,
-        line=message.line,
-        topics=list(topics_of(name)),
-    )
+    log = introspect.to_ros1_log(message)
+    log.topics = list(topics_of(log.name))
+    return log

@@ -8,21 +8,8 @@ from typing import Any, Self
 from rosz.msgs.builtin_interfaces.msg import Duration as DurationMessage
 from rosz.msgs.builtin_interfaces.msg import Time as TimeMessage
 from rosz.node import Clock
-from rosz.ros1.exceptions import ROSInitException
-from rosz.ros1.state import has_node, state
+from rosz.ros1.state import clock, has_node, state
 from rosz.time import ClassicConstructor, TimeValue
-
-__all__ = (
-    "Duration",
-    "Time",
-    "get_rostime",
-    "get_time",
-    "is_rostime_initialized",
-    "is_wallclock",
-    "set_rostime_initialized",
-    "switch_to_wallclock",
-    "wallsleep",
-)
 
 
 class Duration(DurationMessage, metaclass=ClassicConstructor):
@@ -47,15 +34,6 @@ class Time(TimeMessage, metaclass=ClassicConstructor):
     def from_seconds(cls, float_secs: float) -> Self:
         """Return the time of seconds since the epoch; the older name of ``from_sec``."""
         return cls.from_sec(float_secs)
-
-
-def clock() -> Clock:
-    """Return the clock of the node; raise a ROSInitException before ``init_node``."""
-    if state.node is not None:
-        return state.node.clock
-    if state.clock is None:
-        raise ROSInitException("time is not initialized. Have you called init_node()?")
-    return state.clock
 
 
 def get_rostime() -> Time:

@@ -10,7 +10,7 @@ from typing import Any
 from rosz.errors import TimeMovedBackwards
 from rosz.ros1.client.rospy import rostime
 from rosz.ros1.exceptions import ROSInterruptException, ROSTimeMovedBackwardsException
-from rosz.ros1.state import cooperate, is_shutdown, state
+from rosz.ros1.state import clock, cooperate, is_shutdown, state
 from rosz.time import DurationValue, TimeValue
 
 __all__ = ("Rate", "Timer", "TimerEvent", "sleep")
@@ -50,7 +50,7 @@ def sleep(duration: float | DurationValue) -> None:
         cooperate()
         began = time.monotonic()
         try:
-            slept = rostime.clock().sleep(round(seconds * _SECOND))
+            slept = clock().sleep(round(seconds * _SECOND))
         except TimeMovedBackwards as error:
             raise ROSTimeMovedBackwardsException((error.after - error.before) / _SECOND) from error
         if not slept:
