@@ -37,10 +37,7 @@ class Publisher:
     """Publish messages on a topic; made by ``Node.create_publisher``."""
 
     def __init__(
-        self,
-        publisher: RoszPublisher[Any],
-        qos_profile: Any,
-        events: dict[str, EventHandler],
+        self, publisher: RoszPublisher[Any], qos_profile: Any, events: dict[str, EventHandler]
     ) -> None:
         self._publisher = publisher
         self.msg_type: type[Any] = publisher.message_type
@@ -100,6 +97,7 @@ class Subscription:
         raw: bool,
         group: CallbackGroup,
         wake: Callable[[], None],
+        events: SubscriptionEventCallbacks | None,
     ) -> None:
         self.msg_type: type[Any] = msg_type
         self.callback: Callable[..., Any] = callback
@@ -112,18 +110,9 @@ class Subscription:
         self._subscription: RoszSubscription[Any] = node.subscription(
             topic, msg_type, self._receive, qos=qos, raw=raw, with_info=True
         )
-        self.event_handlers: list[EventHandler] = []
-
-    def follow(self, callbacks: SubscriptionEventCallbacks | None) -> None:
-        """Call functions for the events of the subscription.
-
-        Raises:
-            UnsupportedEventTypeError: There is no such event.
-        """
-        group = self.callback_group
-        handlers = handlers_of(self._subscription, callbacks, group, self._wake)
+        handlers = handlers_of(self._subscription, events, group, wake)
         self._lost = handlers.get("message_lost")
-        self.event_handlers = list(handlers.values())
+        self.event_handlers: list[EventHandler] = list(handlers.values())
 
     def _receive(self, message: Any, info: MessageInfo) -> None:
         if info.lost and self._lost is not None:
