@@ -64,95 +64,37 @@ _MESSAGE = {
     " get_service_class",
 }
 
-_RCLPY = {
-    "_rclpy_pybind11": "exceptions InvalidHandle RCLError",
-    "action.client": "action ActionClient ClientGoalHandle GoalStatus",
-    "action.server": "action ActionServer CancelResponse GoalResponse ServerGoalHandle",
-    "callback_groups": "executors CallbackGroup MutuallyExclusiveCallbackGroup"
-    " ReentrantCallbackGroup",
-    "client": "entities Client",
-    "clock": "time Clock ClockChange ClockType JumpHandle JumpThreshold ROSClock TimeJump",
-    "clock_type": "time ClockType",
-    "constants": "time S_TO_NS=CONVERSION_CONSTANT",
-    "context": "context Context",
-    "duration": "time Duration Infinite",
-    "event_handler": "events EventHandler PublisherEventCallbacks QoSEventHandler=EventHandler"
-    " QoSMessageLostInfo=MessageLostInfo QoSPublisherMatchedInfo=MatchedInfo"
-    " QoSSubscriptionMatchedInfo=MatchedInfo SubscriptionEventCallbacks"
-    " IncompatibleTypeInfo UnsupportedEventTypeError",
-    "executors": "executors Entity Executor ExternalShutdownException MultiThreadedExecutor"
-    " ShutdownException SingleThreadedExecutor TimeoutException await_or_execute=completed",
-    "experimental": "executors EventsExecutor=SingleThreadedExecutor",
-    "expand_topic_name": "program expand_topic_name",
-    "guard_condition": "events GuardCondition",
-    "handle": "exceptions InvalidHandle",
-    "impl.logging_severity": "logging LoggingSeverity",
-    "impl.rcutils_logger": "logging RcutilsLogger get_logger",
-    "lifecycle.managed_entity": "lifecycle ManagedEntity SimpleManagedEntity",
-    "lifecycle.node": "lifecycle *",
-    "parameter": "parameter PARAMETER_SEPARATOR_STRING Parameter get_parameter_value"
-    " parameter_dict_from_yaml_file parameter_value_to_python",
-    "publisher": "entities Publisher",
-    "qos_event": "events PublisherEventCallbacks SubscriptionEventCallbacks"
-    " UnsupportedEventTypeError",
-    "qos_overriding_options": "qos InvalidQosOverridesError QoSOverridingOptions"
-    " QosCallbackResult=SetParametersResult",
-    "serialization": "program deserialize_message serialize_message",
-    "service": "entities Service",
-    "service_introspection": "entities ServiceIntrospectionState",
-    "signals": "program SignalHandlerOptions",
-    "subscription": "entities Subscription",
-    "task": "executors Future Task",
-    "time": "time CONVERSION_CONSTANT ClockType Duration Time",
-    "topic_endpoint_info": "qos QoSHistoryPolicy TopicEndpointInfo TopicEndpointTypeEnum",
-    "utilities": "program get_default_context get_rmw_implementation_identifier ok remove_ros_args"
-    " shutdown try_shutdown",
-    "wait_for_message": "program wait_for_message",
-}
-"""Submodules of rclpy without a file: the module below ``rosz.ros2.rclpy`` and its names."""
-
-_BUILT: Mapping[str, Mapping[str, str]] = {
-    "actionlib.exceptions": {"rosz.errors": "ActionException=UsageError"},
-    "actionlib.goal_id_generator": {"actionlib.action_server": "GoalIDGenerator"},
-    "actionlib.handle_tracker_deleter": {"actionlib.action_server": "HandleTrackerDeleter"},
-    "actionlib.server_goal_handle": {"actionlib.action_server": "ServerGoalHandle"},
-    "actionlib.simple_action_client": {
-        "actionlib.action_client": "SimpleActionClient SimpleGoalState"
-    },
-    "actionlib.simple_action_server": {"actionlib.action_server": "SimpleActionServer"},
-    "actionlib.status_tracker": {"actionlib.action_server": "StatusTracker"},
-    "ament_index_python.packages": {"ament_index_python": "*"},
-    "bondpy.bondpy": {"bondpy": "Bond as_float_duration as_ros_duration"},
-    "camera_info_manager.camera_info_manager": {"camera_info_manager": "*"},
+_BUILT: Mapping[str, str | Mapping[str, str]] = {
+    "actionlib.exceptions": "rosz.errors ActionException=UsageError",
+    "actionlib.goal_id_generator": "actionlib.action_server GoalIDGenerator",
+    "actionlib.handle_tracker_deleter": "actionlib.action_server HandleTrackerDeleter",
+    "actionlib.server_goal_handle": "actionlib.action_server ServerGoalHandle",
+    "actionlib.simple_action_client": "actionlib.action_client SimpleActionClient SimpleGoalState",
+    "actionlib.simple_action_server": "actionlib.action_server SimpleActionServer",
+    "actionlib.status_tracker": "actionlib.action_server StatusTracker",
+    "ament_index_python.packages": "ament_index_python *",
+    "bondpy.bondpy": "bondpy Bond as_float_duration as_ros_duration",
+    "camera_info_manager.camera_info_manager": "camera_info_manager *",
     "cv_bridge.boost": {},
-    "cv_bridge.boost.cv_bridge_boost": {
-        "cv_bridge": "CV_MAT_CNWrap CV_MAT_DEPTHWrap cvtColor2 cvtColorForDisplay getCvType"
-    },
-    "cv_bridge.core": {"cv_bridge": "CvBridge CvBridgeError"},
-    "diagnostic_updater._diagnostic_status_wrapper": {
-        "diagnostic_updater": "ERROR OK WARN DiagnosticStatusWrapper"
-    },
-    "diagnostic_updater._diagnostic_updater": {
-        "diagnostic_updater": "CompositeDiagnosticTask DiagnosticTask DiagnosticTaskVector"
-        " FunctionDiagnosticTask Updater"
-    },
-    "diagnostic_updater._publisher": {
-        "diagnostic_updater": "DiagnosedPublisher HeaderlessTopicDiagnostic TopicDiagnostic"
-    },
-    "diagnostic_updater._update_functions": {
-        "diagnostic_updater": "FrequencyStatus FrequencyStatusParam Heartbeat TimeStampStatus"
-        " TimeStampStatusParam"
-    },
+    "cv_bridge.boost.cv_bridge_boost": "cv_bridge CV_MAT_CNWrap CV_MAT_DEPTHWrap cvtColor2"
+    " cvtColorForDisplay getCvType",
+    "cv_bridge.core": "cv_bridge CvBridge CvBridgeError",
+    "diagnostic_updater._diagnostic_status_wrapper": "diagnostic_updater ERROR OK WARN"
+    " DiagnosticStatusWrapper",
+    "diagnostic_updater._diagnostic_updater": "diagnostic_updater CompositeDiagnosticTask"
+    " DiagnosticTask DiagnosticTaskVector FunctionDiagnosticTask Updater",
+    "diagnostic_updater._publisher": "diagnostic_updater DiagnosedPublisher"
+    " HeaderlessTopicDiagnostic TopicDiagnostic",
+    "diagnostic_updater._update_functions": "diagnostic_updater FrequencyStatus"
+    " FrequencyStatusParam Heartbeat TimeStampStatus TimeStampStatusParam",
     "dynamic_reconfigure.encoding": {
         "rosz.reconfigure": "Config",
         "rosz.reconfigure.messages": "decode_config decode_description encode_config"
         " encode_description encode_groups extract_params get_tree group_dict in_groups"
         " initial_config",
     },
-    "dynamic_reconfigure.exceptions": {
-        "dynamic_reconfigure": "DynamicReconfigureCallbackException DynamicReconfigureException"
-        " DynamicReconfigureParameterException"
-    },
+    "dynamic_reconfigure.exceptions": "dynamic_reconfigure DynamicReconfigureCallbackException"
+    " DynamicReconfigureException DynamicReconfigureParameterException",
     "dynamic_reconfigure.parameter_generator": {
         "dynamic_reconfigure.parameter_generator_catkin": "ParameterGenerator Template"
         " bool_t double_t inspect int_t os re str_t sys",
@@ -166,85 +108,109 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         "genmsg": "EXT_MSG HEADER SEP InvalidMsgSpec",
     },
     "genmsg.names": {"genmsg": f"PRN_SEPARATOR normalize_package_context {_NAMES}"},
-    "genpy.dynamic": {"genpy": "generate_dynamic"},
+    "genpy.dynamic": "genpy generate_dynamic",
     "genpy.message": {**_MESSAGE, "genpy": f"MessageException is_simple {_MESSAGE['genpy']}"},
-    "genpy.rostime": {"genpy": "Duration TVal Time"},
-    "image_geometry.cameramodels": {"image_geometry": "PinholeCameraModel StereoCameraModel mkmat"},
-    "interactive_markers.interactive_marker_server": {
-        "interactive_markers": "Header InteractiveMarker InteractiveMarkerFeedback"
-        " InteractiveMarkerInit InteractiveMarkerPose InteractiveMarkerServer"
-        " InteractiveMarkerUpdate Lock MarkerContext UpdateContext rospy"
-    },
-    "interactive_markers.menu_handler": {
-        "interactive_markers": "EntryContext InteractiveMarkerFeedback MenuEntry MenuHandler rospy"
-    },
-    "laser_geometry.laser_geometry": {"laser_geometry": "LaserProjection"},
+    "genpy.rostime": "genpy Duration TVal Time",
+    "image_geometry.cameramodels": "image_geometry PinholeCameraModel StereoCameraModel mkmat",
+    "interactive_markers.interactive_marker_server": "interactive_markers Header InteractiveMarker"
+    " InteractiveMarkerFeedback InteractiveMarkerInit InteractiveMarkerPose InteractiveMarkerServer"
+    " InteractiveMarkerUpdate Lock MarkerContext UpdateContext rospy",
+    "interactive_markers.menu_handler": "interactive_markers EntryContext InteractiveMarkerFeedback"
+    " MenuEntry MenuHandler rospy",
+    "laser_geometry.laser_geometry": "laser_geometry LaserProjection",
+    "rclpy._rclpy_pybind11": "rclpy.exceptions InvalidHandle RCLError",
+    "rclpy.action.client": "rclpy.action ActionClient ClientGoalHandle GoalStatus",
+    "rclpy.action.server": "rclpy.action ActionServer CancelResponse GoalResponse ServerGoalHandle",
+    "rclpy.callback_groups": "rclpy.executors CallbackGroup MutuallyExclusiveCallbackGroup"
+    " ReentrantCallbackGroup",
+    "rclpy.client": "rclpy.entities Client",
+    "rclpy.clock": "rclpy.time Clock ClockChange ClockType JumpHandle JumpThreshold ROSClock"
+    " TimeJump",
+    "rclpy.clock_type": "rclpy.time ClockType",
+    "rclpy.constants": "rclpy.time S_TO_NS=CONVERSION_CONSTANT",
+    "rclpy.context": "rclpy.context Context",
+    "rclpy.duration": "rclpy.time Duration Infinite",
+    "rclpy.event_handler": "rclpy.events EventHandler PublisherEventCallbacks"
+    " QoSEventHandler=EventHandler QoSMessageLostInfo=MessageLostInfo"
+    " QoSPublisherMatchedInfo=MatchedInfo QoSSubscriptionMatchedInfo=MatchedInfo"
+    " SubscriptionEventCallbacks IncompatibleTypeInfo UnsupportedEventTypeError",
+    "rclpy.executors": "rclpy.executors Entity Executor ExternalShutdownException"
+    " MultiThreadedExecutor ShutdownException SingleThreadedExecutor TimeoutException"
+    " await_or_execute=completed",
+    "rclpy.expand_topic_name": "rclpy.program expand_topic_name",
+    "rclpy.experimental": "rclpy.executors EventsExecutor=SingleThreadedExecutor",
     "rclpy.experimental.events_executor": {},
-    "rclpy.impl": {"rclpy": "logging"},
-    "rclpy.impl.implementation_singleton": {"rclpy": "rclpy_implementation=exceptions"},
+    "rclpy.guard_condition": "rclpy.events GuardCondition",
+    "rclpy.handle": "rclpy.exceptions InvalidHandle",
+    "rclpy.impl": "rclpy logging",
+    "rclpy.impl.implementation_singleton": "rclpy rclpy_implementation=exceptions",
+    "rclpy.impl.logging_severity": "rclpy.logging LoggingSeverity",
+    "rclpy.impl.rcutils_logger": "rclpy.logging RcutilsLogger get_logger",
+    "rclpy.lifecycle.managed_entity": "rclpy.lifecycle ManagedEntity SimpleManagedEntity",
+    "rclpy.lifecycle.node": "rclpy.lifecycle *",
+    "rclpy.parameter": "rclpy.parameter PARAMETER_SEPARATOR_STRING Parameter get_parameter_value"
+    " parameter_dict_from_yaml_file parameter_value_to_python",
+    "rclpy.publisher": "rclpy.entities Publisher",
+    "rclpy.qos_event": "rclpy.events PublisherEventCallbacks SubscriptionEventCallbacks"
+    " UnsupportedEventTypeError",
+    "rclpy.qos_overriding_options": "rclpy.qos InvalidQosOverridesError QoSOverridingOptions"
+    " QosCallbackResult=SetParametersResult",
+    "rclpy.serialization": "rclpy.program deserialize_message serialize_message",
+    "rclpy.service": "rclpy.entities Service",
+    "rclpy.service_introspection": "rclpy.entities ServiceIntrospectionState",
+    "rclpy.signals": "rclpy.program SignalHandlerOptions",
+    "rclpy.subscription": "rclpy.entities Subscription",
+    "rclpy.task": "rclpy.executors Future Task",
+    "rclpy.time": "rclpy.time CONVERSION_CONSTANT ClockType Duration Time",
     "rclpy.timer": {"rclpy.entities": "Timer", "rclpy.time": "Rate"},
-    **{
-        f"rclpy.{name}": {f"rclpy.{home}": names}
-        for name, (home, _, names) in ((n, t.partition(" ")) for n, t in _RCLPY.items())
-    },
+    "rclpy.topic_endpoint_info": "rclpy.qos QoSHistoryPolicy TopicEndpointInfo"
+    " TopicEndpointTypeEnum",
+    "rclpy.utilities": "rclpy.program get_default_context get_rmw_implementation_identifier ok"
+    " remove_ros_args shutdown try_shutdown",
+    "rclpy.wait_for_message": "rclpy.program wait_for_message",
     "ros2cli.node": {},
-    "ros2cli.node.strategy": {"ros2cli": "NodeStrategy"},
+    "ros2cli.node.strategy": "ros2cli NodeStrategy",
     "ros2topic": {},
-    "ros2topic.api": {"ros2cli": "get_topic_names_and_types"},
-    "rosidl_runtime_py.convert": {
-        "rosidl_runtime_py": "message_to_csv message_to_ordereddict message_to_yaml"
-    },
-    "rosidl_runtime_py.set_message": {"rosidl_runtime_py": "set_message_fields"},
-    "rosidl_runtime_py.utilities": {
-        "rosidl_runtime_py": "get_action get_interface get_message get_service"
-    },
-    "ros_numpy.geometry": {
-        "ros_numpy": "Point Pose Quaternion Transform Vector3 converts_from_numpy"
-        " converts_to_numpy np numpy_to_point numpy_to_pose numpy_to_quat numpy_to_transform"
-        " numpy_to_vector3 point_to_numpy pose_to_numpy quat_to_numpy transform_to_numpy"
-        " transformations vector3_to_numpy"
-    },
-    "ros_numpy.image": {
-        "ros_numpy": "Image converts_from_numpy converts_to_numpy image_to_numpy name_to_dtypes np"
-        " numpy_to_image sys"
-    },
-    "ros_numpy.occupancy_grid": {
-        "ros_numpy": "MapMetaData OccupancyGrid converts_from_numpy converts_to_numpy np"
-        " numpy_to_occupancy_grid occupancygrid_to_numpy sys"
-    },
-    "ros_numpy.point_cloud2": {
-        "ros_numpy": "DUMMY_FIELD_PREFIX PointCloud2 PointField array_to_pointcloud2"
-        " converts_from_numpy converts_to_numpy dtype_to_fields fields_to_dtype get_xyz_points"
-        " merge_rgb_fields np nptype_to_pftype pftype_sizes pftype_to_nptype"
-        " pointcloud2_to_array pointcloud2_to_xyz_array split_rgb_field type_mappings"
-    },
-    "ros_numpy.registry": {"ros_numpy": "converts_from_numpy converts_to_numpy msgify numpify"},
-    "rosbag.bag": {
-        "rosbag": "Bag BagMessage BagMessageWithConnectionHeader Compression CompressionTuple"
-        " ROSBagEncryptException ROSBagEncryptNotSupportedException ROSBagException"
-        " ROSBagFormatException ROSBagUnindexedException TopicTuple TypesAndTopicsTuple"
-    },
-    "rosbag.rosbag_main": {"rosbag": "rosbagmain"},
+    "ros2topic.api": "ros2cli get_topic_names_and_types",
+    "ros_numpy.geometry": "ros_numpy Point Pose Quaternion Transform Vector3 converts_from_numpy"
+    " converts_to_numpy np numpy_to_point numpy_to_pose numpy_to_quat numpy_to_transform"
+    " numpy_to_vector3 point_to_numpy pose_to_numpy quat_to_numpy transform_to_numpy"
+    " transformations vector3_to_numpy",
+    "ros_numpy.image": "ros_numpy Image converts_from_numpy converts_to_numpy image_to_numpy"
+    " name_to_dtypes np numpy_to_image sys",
+    "ros_numpy.occupancy_grid": "ros_numpy MapMetaData OccupancyGrid converts_from_numpy"
+    " converts_to_numpy np numpy_to_occupancy_grid occupancygrid_to_numpy sys",
+    "ros_numpy.point_cloud2": "ros_numpy DUMMY_FIELD_PREFIX PointCloud2 PointField"
+    " array_to_pointcloud2 converts_from_numpy converts_to_numpy dtype_to_fields fields_to_dtype"
+    " get_xyz_points merge_rgb_fields np nptype_to_pftype pftype_sizes pftype_to_nptype"
+    " pointcloud2_to_array pointcloud2_to_xyz_array split_rgb_field type_mappings",
+    "ros_numpy.registry": "ros_numpy converts_from_numpy converts_to_numpy msgify numpify",
+    "rosbag.bag": "rosbag Bag BagMessage BagMessageWithConnectionHeader Compression"
+    " CompressionTuple ROSBagEncryptException ROSBagEncryptNotSupportedException ROSBagException"
+    " ROSBagFormatException ROSBagUnindexedException TopicTuple TypesAndTopicsTuple",
+    "rosbag.rosbag_main": "rosbag rosbagmain",
     "rosgraph.impl": {},
-    "rosgraph.rosenv": {
-        "rosgraph.names": "DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP ROS_IPV6"
-        " ROS_MASTER_URI ROS_NAMESPACE get_master_uri"
-    },
-    "roslaunch.arg_dump": {"roslaunch.node_args": "dump_args get_args"},
+    "rosgraph.rosenv": "rosgraph.names DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP"
+    " ROS_IPV6 ROS_MASTER_URI ROS_NAMESPACE get_master_uri",
+    "rosidl_runtime_py.convert": "rosidl_runtime_py message_to_csv message_to_ordereddict"
+    " message_to_yaml",
+    "rosidl_runtime_py.set_message": "rosidl_runtime_py set_message_fields",
+    "rosidl_runtime_py.utilities": "rosidl_runtime_py get_action get_interface get_message"
+    " get_service",
+    "roslaunch.arg_dump": "roslaunch.node_args dump_args get_args",
     "roslaunch.launch": {"roslaunch.parent": "ROSLaunchRunner", "roslaunch.core": "RLException"},
-    "roslaunch.nodeprocess": {"roslaunch.pmon": "LocalProcess=Process"},
-    "roslaunch.param_dump": {"roslaunch.node_args": "dump_params"},
+    "roslaunch.nodeprocess": "roslaunch.pmon LocalProcess=Process",
+    "roslaunch.param_dump": "roslaunch.node_args dump_params",
     "roslaunch.rlutil": {
         "roslaunch.node_args": "check_log_disk_usage check_roslaunch resolve_launch_arguments",
         "roslaunch.parent": "get_or_generate_uuid",
     },
-    "roslaunch.scriptapi": {"roslaunch.parent": "ROSLaunch"},
-    "roslaunch.substitution_args": {
-        "roslaunch.loader": "ArgException SubstitutionException resolve_args"
-    },
-    "roslaunch.xmlloader": {"roslaunch.loader": "LoadException Loader XmlLoader XmlParseException"},
-    "roslib.exceptions": {"roslib.packages": "ROSLibException"},
-    "roslib.launcher": {"roslib.packages": "get_depends load_manifest"},
+    "roslaunch.scriptapi": "roslaunch.parent ROSLaunch",
+    "roslaunch.substitution_args": "roslaunch.loader ArgException SubstitutionException"
+    " resolve_args",
+    "roslaunch.xmlloader": "roslaunch.loader LoadException Loader XmlLoader XmlParseException",
+    "roslib.exceptions": "roslib.packages ROSLibException",
+    "roslib.launcher": "roslib.packages get_depends load_manifest",
     "roslib.message": {**_MESSAGE, "rosz.time": "TVal=StampValue"},
     "roslib.names": {
         "genmsg": f"PRN_SEPARATOR {_NAMES}",
@@ -260,7 +226,7 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         " is_local_address",
         "rosgraph.names": "ROS_HOSTNAME ROS_IP",
     },
-    "roslib.resources": {"roslib.packages": "list_package_resources list_package_resources_by_dir"},
+    "roslib.resources": "roslib.packages list_package_resources list_package_resources_by_dir",
     "roslib.rosenv": {
         "rosgraph.names": "ROS_HOSTNAME ROS_IP ROS_MASTER_URI ROS_NAMESPACE get_master_uri",
         "rospkg": "ROS_HOME ROS_LOG_DIR ROS_PACKAGE_PATH ROS_ROOT get_log_dir get_ros_home"
@@ -279,63 +245,48 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         "genmsg": "EXT=EXT_SRV SEP",
         "roslib.msgs": "COMMENTCHAR IODELIM list_srv_types srv_file",
     },
-    "rospkg.common": {"rospkg": "MANIFEST_FILE PACKAGE_FILE ResourceNotFound"},
-    "rospkg.environment": {
-        "rospkg": "ROS_ETC_DIR ROS_HOME ROS_LOG_DIR ROS_PACKAGE_PATH ROS_ROOT ROS_TEST_RESULTS_DIR"
-        " get_etc_ros_dir get_log_dir get_ros_home get_ros_package_path get_ros_paths"
-        " get_ros_root get_test_results_dir on_ros_path"
-    },
-    "rospkg.manifest": {
-        "rospkg": "MANIFEST_FILE PACKAGE_FILE Depend Export InvalidManifest Manifest"
-        " ResourceNotFound RosDep read_manifest"
-    },
-    "rospkg.rospack": {"rospkg": "ManifestManager list_by_path RosPack RosStack get_package_name"},
+    "rospkg.common": "rospkg MANIFEST_FILE PACKAGE_FILE ResourceNotFound",
+    "rospkg.environment": "rospkg ROS_ETC_DIR ROS_HOME ROS_LOG_DIR ROS_PACKAGE_PATH ROS_ROOT"
+    " ROS_TEST_RESULTS_DIR get_etc_ros_dir get_log_dir get_ros_home get_ros_package_path"
+    " get_ros_paths get_ros_root get_test_results_dir on_ros_path",
+    "rospkg.manifest": "rospkg MANIFEST_FILE PACKAGE_FILE Depend Export InvalidManifest Manifest"
+    " ResourceNotFound RosDep read_manifest",
+    "rospkg.rospack": "rospkg ManifestManager list_by_path RosPack RosStack get_package_name",
     "rospy.impl": {},
-    "rospy.impl.rosout": {"rospy.core": "_rospy_to_logging_levels"},
-    "rospy.impl.tcpros": {"rospy.topics": "DEFAULT_BUFF_SIZE"},
-    "rospy.impl.tcpros_base": {"rospy.topics": "DEFAULT_BUFF_SIZE"},
-    "rospy.impl.tcpros_service": {
-        "rospy.service": "Service ServiceException ServiceImpl=Service ServiceProxy"
-        " convert_return_to_response wait_for_service"
-    },
-    "smach.exceptions": {
-        "smach.util": "InvalidConstructionError InvalidStateError InvalidTransitionError"
-        " InvalidUserCodeError SmachError"
-    },
-    "smach.log": {"smach.util": "logdebug logerr loginfo logwarn set_loggers"},
-    "smach.sequence": {"smach": "Sequence"},
-    "smach.state_machine": {"smach": "StateMachine"},
-    "smach_ros.condition_state": {"smach_ros": "ConditionState"},
-    "smach_ros.monitor_state": {"smach_ros": "MonitorState"},
-    "smach_ros.ros_state": {"smach_ros": "RosState"},
-    "smach_ros.service_state": {"smach_ros.callback_states": "ServiceState"},
-    "smach_ros.simple_action_state": {"smach_ros.callback_states": "SimpleActionState"},
-    "smach_ros.util": {"smach_ros": "set_preempt_handler"},
-    "tf.broadcaster": {"tf": "TransformBroadcaster"},
-    "tf.listener": {
-        "tf": "ConnectivityException Exception ExtrapolationException LookupException"
-        " TransformListener Transformer TransformerROS"
-    },
-    # ROS 1 connects the two types of /tf, which are equal but for their names.
-    "tf.msg": {"rosz.msgs.tf2_msgs.msg": "tfMessage=TFMessage"},
-    "tf2_geometry_msgs.tf2_geometry_msgs": {
-        "tf2_geometry_msgs": "do_transform_point do_transform_pose do_transform_vector3"
-        " do_transform_wrench from_msg_msg to_msg_msg transform_to_kdl"
-    },
-    "tf2_kdl.tf2_kdl": {"tf2_kdl": "*"},
-    "tf2_ros.buffer_client": {"tf2_ros": "BufferClient"},
-    "tf2_ros.buffer_server": {"tf2_ros": "BufferServer"},
-    "tf2_ros.static_transform_broadcaster": {"tf2_ros.buffer": "StaticTransformBroadcaster"},
-    "tf2_ros.transform_broadcaster": {"tf2_ros.buffer": "TransformBroadcaster node_of"},
-    "tf2_ros.transform_listener": {"tf2_ros.buffer": "TransformListener"},
-    "tf2_sensor_msgs.tf2_sensor_msgs": {"tf2_sensor_msgs": "do_transform_cloud"},
-    "tf_conversions.posemath": {
-        "tf_conversions": "Equal Frame Point Pose Quaternion Rotation SetToZero Twist Vector"
-        " Wrench addDelta diff dot fromCameraParams fromMatrix fromMsg fromTf numpy toMatrix"
-        " toMsg toTf transformations"
-    },
+    "rospy.impl.rosout": "rospy.core _rospy_to_logging_levels",
+    "rospy.impl.tcpros": "rospy.topics DEFAULT_BUFF_SIZE",
+    "rospy.impl.tcpros_base": "rospy.topics DEFAULT_BUFF_SIZE",
+    "rospy.impl.tcpros_service": "rospy.service Service ServiceException ServiceImpl=Service"
+    " ServiceProxy convert_return_to_response wait_for_service",
+    "smach.exceptions": "smach.util InvalidConstructionError InvalidStateError"
+    " InvalidTransitionError InvalidUserCodeError SmachError",
+    "smach.log": "smach.util logdebug logerr loginfo logwarn set_loggers",
+    "smach.sequence": "smach Sequence",
+    "smach.state_machine": "smach StateMachine",
+    "smach_ros.condition_state": "smach_ros ConditionState",
+    "smach_ros.monitor_state": "smach_ros MonitorState",
+    "smach_ros.ros_state": "smach_ros RosState",
+    "smach_ros.service_state": "smach_ros.callback_states ServiceState",
+    "smach_ros.simple_action_state": "smach_ros.callback_states SimpleActionState",
+    "smach_ros.util": "smach_ros set_preempt_handler",
+    "tf.broadcaster": "tf TransformBroadcaster",
+    "tf.listener": "tf ConnectivityException Exception ExtrapolationException LookupException"
+    " TransformListener Transformer TransformerROS",
+    "tf.msg": "rosz.msgs.tf2_msgs.msg tfMessage=TFMessage",
+    "tf2_geometry_msgs.tf2_geometry_msgs": "tf2_geometry_msgs do_transform_point do_transform_pose"
+    " do_transform_vector3 do_transform_wrench from_msg_msg to_msg_msg transform_to_kdl",
+    "tf2_kdl.tf2_kdl": "tf2_kdl *",
+    "tf2_ros.buffer_client": "tf2_ros BufferClient",
+    "tf2_ros.buffer_server": "tf2_ros BufferServer",
+    "tf2_ros.static_transform_broadcaster": "tf2_ros.buffer StaticTransformBroadcaster",
+    "tf2_ros.transform_broadcaster": "tf2_ros.buffer TransformBroadcaster node_of",
+    "tf2_ros.transform_listener": "tf2_ros.buffer TransformListener",
+    "tf2_sensor_msgs.tf2_sensor_msgs": "tf2_sensor_msgs do_transform_cloud",
+    "tf_conversions.posemath": "tf_conversions Equal Frame Point Pose Quaternion Rotation SetToZero"
+    " Twist Vector Wrench addDelta diff dot fromCameraParams fromMatrix fromMsg fromTf numpy"
+    " toMatrix toMsg toTf transformations",
 }
-"""Submodules without a file of their own. They hold names of other modules."""
+"""Submodules without a file: the module whose names they hold and the names, or several such."""
 
 MODULES: Mapping[str, Module] = {
     **{
@@ -352,7 +303,10 @@ MODULES: Mapping[str, Module] = {
     "sensor_msgs.point_cloud2": Module("ros1.client.point_cloud2"),
     "sensor_msgs_py": Module("ros2.sensor_msgs_py", extras=_NUMPY),
     "tf_transformations": Module("ros1.client.tf.transformations"),
-    **{name: Module(names=names) for name, names in _BUILT.items()},
+    **{
+        name: Module(names=dict([held.split(" ", 1)]) if isinstance(held, str) else held)
+        for name, held in _BUILT.items()
+    },
 }
 """Modules of ROS 1 and rclpy, by the names that programs import."""
 
@@ -398,9 +352,10 @@ _VALUES = (str, bytes, int, float, tuple, list, dict, set, frozenset, MethodType
 
 
 _RCLPY_NAMES = {
-    name.partition("=")[0]: f"rclpy.{module}"
-    for module, text in _RCLPY.items()
-    for name in text.split()[1:]
+    name.partition("=")[0]: module
+    for module, held in _BUILT.items()
+    if isinstance(held, str) and module.startswith("rclpy.")
+    for name in held.split()[1:]
 }
 for _home, _names in (
     ("rcl_interfaces.msg", "ParameterDescriptor ParameterType ParameterValue SetParametersResult"),
