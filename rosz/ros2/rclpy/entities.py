@@ -97,7 +97,6 @@ class Subscription:
         raw: bool,
         group: CallbackGroup,
         wake: Callable[[], None],
-        events: SubscriptionEventCallbacks | None,
     ) -> None:
         self.msg_type: type[Any] = msg_type
         self.callback: Callable[..., Any] = callback
@@ -110,9 +109,17 @@ class Subscription:
         self._subscription: RoszSubscription[Any] = node.subscription(
             topic, msg_type, self._receive, qos=qos, raw=raw, with_info=True
         )
-        handlers = handlers_of(self._subscription, events, group, wake)
+        self.event_handlers: list[EventHandler] = []
+
+    def follow(self, callbacks: SubscriptionEventCallbacks | None) -> None:
+        """Call functions for the events of the subscription.
+
+        Raises:
+            UnsupportedEventTypeError: There is no such event.
+        """
+        handlers = handlers_of(self._subscription, callbacks, self.callback_group, self._wake)
         self._lost = handlers.get("message_lost")
-        self.event_handlers: list[EventHandler] = list(handlers.values())
+        self.event_handlers = list(handlers.values())
 
     def _receive(self, message: Any, info: MessageInfo) -> None:
         if info.lost and self._lost is not None:

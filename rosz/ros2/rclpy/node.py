@@ -220,8 +220,8 @@ class Node(NodeParameters):
             raw=raw,
             group=callback_group or self.default_callback_group,
             wake=self.rosz_wake,
-            events=event_callbacks,
         )
+        subscription.follow(event_callbacks)
         return self.rosz_add(subscription)
 
     def create_timer(
