@@ -145,15 +145,26 @@ class Package(msgspec.Struct, frozen=True):
             tree = ast.parse(source)
         except (SyntaxError, ValueError):  # 'rosz pkg check' reports it
             return {}
+        names: dict[str, str] = {}
+
+        def text_of(node: ast.AST) -> str:
+            """Return the text of an expression with ``+`` and f-strings; lists have lines."""
+            if isinstance(node, ast.Constant | ast.Name):
+                return names.get(node.id, "") if isinstance(node, ast.Name) else str(node.value)
+            glue = "\n" if isinstance(node, ast.List | ast.Tuple) else ""
+            return glue.join(map(text_of, ast.iter_child_nodes(node)))
+
+        for node in tree.body:
+            if isinstance(node, ast.Assign):
+                names[ast.unparse(node.targets[0])] = text_of(node.value)
         listed = [
-            item.value
+            text
             for node in ast.walk(tree)
             if isinstance(node, ast.Dict)
             for key, value in zip(node.keys, node.values, strict=True)
             if isinstance(key, ast.Constant) and key.value == "console_scripts"
-            if isinstance(value, ast.List | ast.Tuple)
-            for item in value.elts
-            if isinstance(item, ast.Constant) and isinstance(item.value, str)
+            for text in text_of(value).split("\n")
+            if "=" in text
         ]
         pairs = (text.partition("=") for text in listed)
         return {name.strip(): entry.strip() for name, _, entry in pairs}

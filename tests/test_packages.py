@@ -50,6 +50,26 @@ def test_a_root_may_be_a_package(tmp_path: Path) -> None:
     assert PackageIndex([tmp_path / "p"]).find("solo").path == tmp_path / "p"
 
 
+def test_entry_points_as_expressions(tmp_path: Path) -> None:
+    folder = make(tmp_path / "p", "demo")
+    (folder / "setup.py").write_text(
+        "package_name = 'demo'\nnodes = package_name + '.nodes'\n"
+        "more = [f'a = {package_name}.a:main', 'b = ' + nodes + '.b:main']\n"
+        "more = more + ['not one']\n"
+        "setup(entry_points={'console_scripts': ['c=demo.c:main', ['d='\n"
+        "    'demo.d:main'], *more]})\n"
+    )
+    for name in ("a", "nodes/b", "c", "d"):
+        (folder / "demo" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "demo" / f"{name}.py").touch()
+    (package,) = PackageIndex([tmp_path]).packages()
+    assert package.executables() == ["a", "b", "c", "d"]
+    assert package.executable("b") == folder / "demo/nodes/b.py:main"
+    (folder / "setup.py").write_text("setup(entry_points={'console_scripts': 'a = demo.a:run'})")
+    (package,) = PackageIndex([tmp_path]).packages()
+    assert package.executable("a") == folder / "demo/a.py:run"
+
+
 def test_ignored_folders(tmp_path: Path) -> None:
     make(tmp_path / "a", "alpha")
     (tmp_path / "a" / "CATKIN_IGNORE").touch()

@@ -458,6 +458,7 @@ class Action:
         FeedbackMessage: Class of the messages that carry feedback.
         SendGoal: Class of the service that sends goals.
         GetResult: Class of the service that returns results.
+        Impl: Where ROS 2 has ``FeedbackMessage``, ``SendGoalService`` and ``GetResultService``.
         _type_name: ROS 2 name, ``example_interfaces/action/Fibonacci``.
         _type_hash: RIHS01 hash.
         _text: Text of the definition.
@@ -469,6 +470,9 @@ class Action:
     FeedbackMessage: ClassVar[type[Any]]
     SendGoal: ClassVar[type[Service]]
     GetResult: ClassVar[type[Service]]
+    GetResultService: _Derived[type[Service]] = _Derived(lambda cls: cls.GetResult)
+    SendGoalService: _Derived[type[Service]] = _Derived(lambda cls: cls.SendGoal)
+    Impl: _Derived[type[Any]] = _Derived(lambda cls: cls)
     _type_name: ClassVar[str] = ""
     _type_hash: ClassVar[str] = ""
     _text: ClassVar[str] = ""

@@ -19,6 +19,7 @@ from __future__ import annotations
 import builtins
 import codecs
 import copy  # noqa: F401  # tries to import Jython's "org", which must not be searched for
+import re
 import struct
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -292,7 +293,7 @@ class _FrontFinder(MetaPathFinder):
     def _of_package(
         self, name: str, package: str, kind: Kind, inner: str, path: Sequence[str] | None
     ) -> ModuleSpec | None:
-        """Find ``<package>.msg``, or ``<package>.msg._Type`` as genpy has it."""
+        """Find ``<package>.msg``, ``<package>.msg._Type`` (genpy's), or ``._type`` (ROS 2's)."""
         if not self.types.store.has(package, kind):
             return None
         if not inner:
@@ -304,9 +305,9 @@ class _FrontFinder(MetaPathFinder):
                 return generated
             return _alias(name, lambda: self._module(package, kind))
         module = import_module(f"{package}.{kind}")
-        if not inner.startswith("_") or not hasattr(module, inner[1:]):
-            return None
-        return _alias(name, lambda: _single(name, module, inner[1:]))
+        types = (each for each in module.__all__ if inner in {f"_{each}", f"_{_snake_case(each)}"})
+        type_name = next(types, None)
+        return _alias(name, lambda: _single(name, module, type_name)) if type_name else None
 
     def _module(self, package: str, kind: Kind) -> ModuleType:
         shipped = package in self._shipped
@@ -423,12 +424,20 @@ def _all_modules() -> ModuleType:
 
 
 def _single(name: str, module: ModuleType, type_name: str) -> ModuleType:
-    """Return a module with one type, and with the messages of a service."""
+    """Return a module with one type, and with the messages of a service or action."""
     single = ModuleType(name)
-    for each in (type_name, f"{type_name}Request", f"{type_name}Response"):
-        if hasattr(module, each):
-            setattr(single, each, getattr(module, each))
+    whole = getattr(module, type_name)
+    setattr(single, type_name, whole)
+    for part, cls in vars(whole).items():
+        if isinstance(cls, type) and not part.startswith("_"):
+            setattr(single, f"{type_name}{part}", cls)
+            setattr(single, f"{type_name}_{part}", cls)
     return single
+
+
+def _snake_case(name: str) -> str:
+    """Return the name of the module of a type in ROS 2: ``skeleton3_d`` for ``Skeleton3D``."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=.)(?=[A-Z][a-z])", "_", name).lower()
 
 
 _PLAIN = {"codecs": codecs, "python3": True, "struct": struct, "sys": sys}

@@ -109,6 +109,7 @@ _BUILT: Mapping[str, str] = {
     "interactive_markers.menu_handler": "interactive_markers: EntryContext"
     " InteractiveMarkerFeedback MenuEntry MenuHandler rospy",
     "laser_geometry.laser_geometry": "laser_geometry: LaserProjection",
+    "rclpy._rclpy_pybind11": "rclpy.exceptions: InvalidHandle RCLError",
     "rclpy.action.client": "rclpy.action: ActionClient ClientGoalHandle GoalStatus",
     "rclpy.action.server": "rclpy.action: ActionServer CancelResponse GoalResponse"
     " ServerGoalHandle",
@@ -117,6 +118,8 @@ _BUILT: Mapping[str, str] = {
     "rclpy.client": "rclpy.entities: Client",
     "rclpy.clock": "rclpy.time: Clock ClockChange ClockType JumpHandle JumpThreshold ROSClock"
     " TimeJump",
+    "rclpy.clock_type": "rclpy.time: ClockType",
+    "rclpy.constants": "rclpy.time: S_TO_NS=CONVERSION_CONSTANT",
     "rclpy.context": "rclpy.context: Context",
     "rclpy.duration": "rclpy.time: Duration Infinite",
     "rclpy.event_handler": "rclpy.events: EventHandler PublisherEventCallbacks"
@@ -126,10 +129,17 @@ _BUILT: Mapping[str, str] = {
     "rclpy.executors": "rclpy.executors: Entity Executor ExternalShutdownException"
     " MultiThreadedExecutor ShutdownException SingleThreadedExecutor TimeoutException"
     " await_or_execute=completed",
+    "rclpy.expand_topic_name": "rclpy.program: expand_topic_name",
+    "rclpy.experimental": "rclpy.executors: EventsExecutor=SingleThreadedExecutor",
+    "rclpy.experimental.events_executor": "",
     "rclpy.guard_condition": "rclpy.events: GuardCondition",
+    "rclpy.handle": "rclpy.exceptions: InvalidHandle",
     "rclpy.impl": "rclpy: logging",
+    "rclpy.impl.implementation_singleton": "rclpy: rclpy_implementation=exceptions",
     "rclpy.impl.logging_severity": "rclpy.logging: LoggingSeverity",
-    "rclpy.impl.rcutils_logger": "rclpy.logging: RcutilsLogger",
+    "rclpy.impl.rcutils_logger": "rclpy.logging: RcutilsLogger get_logger",
+    "rclpy.lifecycle.managed_entity": "rclpy.lifecycle: ManagedEntity SimpleManagedEntity",
+    "rclpy.lifecycle.node": "rclpy.lifecycle: *",
     "rclpy.parameter": "rclpy.parameter: PARAMETER_SEPARATOR_STRING Parameter get_parameter_value"
     " parameter_dict_from_yaml_file parameter_value_to_python",
     "rclpy.publisher": "rclpy.entities: Publisher",
@@ -145,9 +155,15 @@ _BUILT: Mapping[str, str] = {
     "rclpy.task": "rclpy.executors: Future Task",
     "rclpy.time": "rclpy.time: CONVERSION_CONSTANT ClockType Duration Time",
     "rclpy.timer": "rclpy.entities: Timer; rclpy.time: Rate",
+    "rclpy.topic_endpoint_info": "rclpy.qos: QoSHistoryPolicy TopicEndpointInfo"
+    " TopicEndpointTypeEnum",
     "rclpy.utilities": "rclpy.program: get_default_context get_rmw_implementation_identifier ok"
     " remove_ros_args shutdown try_shutdown",
     "rclpy.wait_for_message": "rclpy.program: wait_for_message",
+    "ros2cli.node": "",
+    "ros2cli.node.strategy": "ros2cli: NodeStrategy",
+    "ros2topic": "",
+    "ros2topic.api": "ros2cli: get_topic_names_and_types",
     "rosidl_runtime_py.convert": "rosidl_runtime_py: message_to_csv message_to_ordereddict"
     " message_to_yaml",
     "rosidl_runtime_py.set_message": "rosidl_runtime_py: set_message_fields",
@@ -263,6 +279,7 @@ MODULES: Mapping[str, Module] = {
     },
     "ament_index_python": Module("ros2.ament_index_python"),
     "rclpy": Module("ros2.rclpy"),
+    "ros2cli": Module("ros2.ros2cli"),
     "rosgraph.impl.graph": Module("ros1.tools.rosgraph.graph"),
     "rosidl_runtime_py": Module("ros2.rosidl_runtime_py"),
     "rospy.exceptions": Module("ros1.exceptions"),
@@ -314,6 +331,22 @@ _VALUES = (str, bytes, int, float, tuple, list, dict, set, frozenset, MethodType
 """Types of constants, and of the functions of command lines, which are methods of a `Tool`."""
 
 
+_RCLPY_NAMES = {
+    name.partition("=")[0]: module
+    for module, text in _BUILT.items()
+    if module.startswith("rclpy.")
+    for names in _parts(text).values()
+    for name in names.split()
+}
+for _home, _names in (
+    ("rcl_interfaces.msg", "ParameterDescriptor ParameterType ParameterValue SetParametersResult"),
+    ("rclpy.exceptions", "ParameterNotDeclaredException ParameterUninitializedException"),
+    ("rclpy.qos", "QoSProfile"),
+):
+    _RCLPY_NAMES |= dict.fromkeys(_names.split(), _home)
+"""Names that each module of rclpy has: editors import them from a module that imports them."""
+
+
 def home_of(name: str) -> str:
     """Return the module of rosz that a name in the tables of `MODULES` stands for."""
     root, dot, below = name.partition(".")
@@ -357,12 +390,12 @@ def _defines(module: ModuleType, value: object) -> bool:
 
 def explain_missing(name: str, module: ModuleType) -> None:
     """Make a module and its loaded submodules name replacements of missing names."""
-    vars(module).setdefault("__getattr__", attribute(name, module, {}))
     own = f"{module.__name__}."
-    for inner in list(vars(module).values()):
-        if isinstance(inner, ModuleType) and inner.__name__.startswith(own):
-            shown = f"{name}.{inner.__name__.removeprefix(own)}"
-            vars(inner).setdefault("__getattr__", attribute(shown, inner, {}))
+    inner = [each for each in vars(module).values() if isinstance(each, ModuleType)]
+    for each in (module, *(each for each in inner if each.__name__.startswith(own))):
+        shown = name + each.__name__.removeprefix(module.__name__)
+        homes = _RCLPY_NAMES if shown.startswith("rclpy") else {}
+        vars(each).setdefault("__getattr__", attribute(shown, each, homes))
 
 
 def attribute(name: str, module: ModuleType, homes: Mapping[str, str]) -> Callable[[str], Any]:

@@ -61,17 +61,18 @@ class Offers:
             hidden = any(fnmatchcase(name, pattern) for pattern in excluded)
             if is_module(folder / name) and not hidden:
                 return folder / name
-        # Also without a setup.py: catkin's users put the code of a package there.
+        # Also without a setup.py: packages of catkin and ament_cmake have their code there.
         package = self._paths.get(name)
-        own = () if package is None else (package / "src" / name, package / "src" / f"{name}.py")
-        return next((path for path in own if is_module(path)), None)
+        own = () if package is None else (f"src/{name}", f"src/{name}.py", name)
+        return next((package / path for path in own if package and is_module(package / path)), None)
 
     def names(self) -> Iterator[str]:
         """Yield the names of all modules, maybe twice."""
         yield from self._modules
         for folder, _ in self._folders:
             yield from (file.parent.name for file in folder.glob("*/__init__.py"))
-        yield from (name for name, path in self._paths.items() if is_module(path / "src" / name))
+        places = ((name, path / "src" / name, path / name) for name, path in self._paths.items())
+        yield from (name for name, *own in places if any(map(is_module, own)))
 
     @cached_property
     def _paths(self) -> dict[str, Path]:

@@ -31,14 +31,14 @@ class Limits(NamedTuple):
     """The parts of messages that are left out.
 
     Attributes:
-        length: Most items of an array, and letters of a text; None for all.
-        no_arrays: Whether arrays are left out.
-        no_texts: Whether texts are left out.
+        truncate_length: Most items of an array, and letters of a text; None for all.
+        no_arr: Whether arrays are left out.
+        no_str: Whether texts are left out.
     """
 
-    length: int | None = None
-    no_arrays: bool = False
-    no_texts: bool = False
+    truncate_length: int | None = None
+    no_arr: bool = False
+    no_str: bool = False
 
 
 _NO_LIMITS = Limits()
@@ -78,7 +78,7 @@ def message_to_yaml(
 
 def message_to_ordereddict(msg: Message, **options: Any) -> dict[str, Any]:
     """Return a message as a dictionary; the options are those of `message_to_csv`."""
-    plain: dict[str, Any] = to_plain(msg, _limits(**options))
+    plain: dict[str, Any] = to_plain(msg, Limits(**options))
     return OrderedDict(plain)
 
 
@@ -89,13 +89,7 @@ def message_to_csv(msg: Message, **options: Any) -> str:
         msg: The message.
         options: ``truncate_length``, ``no_arr`` and ``no_str``, as of `message_to_yaml`.
     """
-    return to_csv(msg, _limits(**options))
-
-
-def _limits(
-    truncate_length: int | None = None, no_arr: bool = False, no_str: bool = False
-) -> Limits:
-    return Limits(truncate_length, no_arr, no_str)
+    return to_csv(msg, Limits(**options))
 
 
 def set_message_fields(
@@ -168,24 +162,24 @@ def to_plain(value: Any, limits: Limits) -> Any:
     if isinstance(value, Message):
         return {
             name: _array_note(slot, inner)
-            if limits.no_arrays and slot.shape != "one"
+            if limits.no_arr and slot.shape != "one"
             else to_plain(inner, limits)
             for slot, name, inner in _fields(value)
         }
     if isinstance(value, bytes):
         value = value.decode("latin-1")
-    elif isinstance(value, str) and limits.no_texts:
+    elif isinstance(value, str) and limits.no_str:
         return f"<string length: <{len(value)}>>"
     if isinstance(value, str):
-        return value if not _is_long(value, limits) else value[: limits.length] + "..."
+        return value if not _is_long(value, limits) else value[: limits.truncate_length] + "..."
     if isinstance(value, _SEQUENCES):
-        items = [to_plain(each, limits) for each in value[: limits.length]]
+        items = [to_plain(each, limits) for each in value[: limits.truncate_length]]
         return [*items, "..."] if _is_long(value, limits) else items
     return value
 
 
 def _is_long(value: Any, limits: Limits) -> bool:
-    return limits.length is not None and len(value) > limits.length
+    return limits.truncate_length is not None and len(value) > limits.truncate_length
 
 
 def _array_note(slot: Slot, value: Any) -> str:
@@ -202,17 +196,17 @@ def to_csv(value: Any, limits: Limits) -> str:
     if isinstance(value, Message):
         return ",".join(
             _array_note(slot, inner)
-            if limits.no_arrays and slot.shape != "one"
+            if limits.no_arr and slot.shape != "one"
             else to_csv(inner, limits)
             for slot, _, inner in _fields(value)
         )
     if isinstance(value, _SEQUENCES):
-        items = [to_csv(each, limits) for each in value[: limits.length]]
+        items = [to_csv(each, limits) for each in value[: limits.truncate_length]]
         return ",".join([*items, "..."] if _is_long(value, limits) else items)
     if isinstance(value, str):
         return str(to_plain(value, limits))
     if isinstance(value, bytes) and _is_long(value, limits):
-        value = value[: limits.length] + b"..."
+        value = value[: limits.truncate_length] + b"..."
     return str(value)
 
 

@@ -174,7 +174,7 @@ class Buffer:
         self._frames: dict[str, History] = {}
         self._parents: set[str] = set()
         self._lock = threading.RLock()
-        self._waiters: list[tuple[Callable[[], bool], Clock]] = []
+        self._waiters: list[tuple[Callable[[], bool], Callable[[], object]]] = []
 
     def set(
         self,
@@ -211,9 +211,9 @@ class Buffer:
             added = history.add(stamp, ParentPose(parent, pose), authority)
             if added:
                 self._parents.add(parent)
-                for condition, alarm in self._waiters:
+                for condition, act in tuple(self._waiters):
                     if condition():
-                        alarm.close()
+                        act()
             return added
 
     def clear(self) -> None:
@@ -374,19 +374,27 @@ class Buffer:
             Whether the condition was met.
         """
         alarm = clock.branch()
-        waiter = known, alarm
-        with self._lock:
-            if known():
-                return True
-            self._waiters.append(waiter)
+        forget = self.when(known, alarm.close)
         try:
             alarm.sleep(timeout_ns)
         except TimeMovedBackwards:
             pass
         finally:
-            with self._lock:
-                self._waiters.remove(waiter)
+            forget()
         return known()
+
+    def when(self, known: Callable[[], bool], act: Callable[[], object]) -> Callable[[], object]:
+        """Call a function whenever a transform is added, and now, if a condition is met.
+
+        Returns:
+            A function that ends this.
+        """
+        waiter = known, act
+        with self._lock:
+            self._waiters.append(waiter)
+            if known():
+                act()
+        return lambda: self._waiters.remove(waiter)
 
     def _check_frame(self, name: str, role: str) -> None:
         if not name:

@@ -15,6 +15,7 @@ from typing import Any
 
 from rosz.msgs.diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosz.ros1.client import rospy
+from rosz.ros1.state import state
 
 __all__ = (
     "ERROR",
@@ -193,6 +194,10 @@ class Updater(DiagnosticTaskVector):
 
     Call `update` often; the tasks run once in ``~diagnostic_period`` seconds (1).
 
+    Args:
+        node: An rclpy node, whose timer runs the tasks; the node of the process when not given.
+        period: Seconds between two runs by that timer.
+
     Attributes:
         period: Seconds between two runs of the tasks.
         hwid: Hardware ID of all statuses.
@@ -202,12 +207,20 @@ class Updater(DiagnosticTaskVector):
         ROSInitException: ``rospy.init_node`` was not called.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, node: Any = None, period: float = 1) -> None:
         super().__init__()
-        self.publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._node_name = rospy.get_name
+        self._alone = node is None
+        if self._alone:
+            self.publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        else:
+            state.clock = node.rosz_node.clock
+            self._node_name = node.get_fully_qualified_name
+            self.publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 1)
+            node.create_timer(period, self.force_update)
         self.last_time = rospy.Time.now()
         self.last_time_period_checked = self.last_time
-        self.period: float = 1
+        self.period: float = period
         self.verbose = False
         self.hwid = ""
         self.warn_nohwid_done = False
@@ -219,7 +232,9 @@ class Updater(DiagnosticTaskVector):
     def update(self) -> None:
         """Run the tasks and publish, if the period has passed."""
         now = rospy.Time.now()
-        if now >= self.last_time_period_checked + rospy.Duration.from_sec(_PERIOD_CHECK):
+        if self._alone and now >= self.last_time_period_checked + rospy.Duration.from_sec(
+            _PERIOD_CHECK
+        ):
             self.period = rospy.get_param_cached("~diagnostic_period", 1)
             self.last_time_period_checked = now
         if now >= self.last_time + rospy.Duration.from_sec(self.period):
@@ -250,7 +265,7 @@ class Updater(DiagnosticTaskVector):
         """Publish a status or a list of them, with the name of the node before theirs."""
         statuses: list[DiagnosticStatus] = msg if isinstance(msg, list) else [msg]
         for status in statuses:
-            status.name = f"{rospy.get_name()[1:]}: {status.name}"
+            status.name = f"{self._node_name()[1:]}: {status.name}"
         array = DiagnosticArray(status=statuses)
         array.header.stamp = rospy.Time.now()
         self.publisher.publish(array)

@@ -6,11 +6,6 @@ file here (``rclpy.publisher``, ``rclpy.duration``, …) are listed in ``rosz.ro
 """
 
 from rosz.ros2.rclpy import context, exceptions, executors, logging, node, parameter, qos, time
-from rosz.ros2.rclpy import executors as callback_groups
-from rosz.ros2.rclpy import executors as task
-from rosz.ros2.rclpy import program as utilities
-from rosz.ros2.rclpy import time as clock
-from rosz.ros2.rclpy import time as duration
 from rosz.ros2.rclpy.context import get_default_context
 from rosz.ros2.rclpy.executors import Future, get_global_executor
 from rosz.ros2.rclpy.parameter import Parameter
@@ -30,11 +25,8 @@ __all__ = (
     "Future",
     "Parameter",
     "SignalHandlerOptions",
-    "callback_groups",
-    "clock",
     "context",
     "create_node",
-    "duration",
     "exceptions",
     "executors",
     "get_default_context",
@@ -49,8 +41,6 @@ __all__ = (
     "spin",
     "spin_once",
     "spin_until_future_complete",
-    "task",
     "time",
     "try_shutdown",
-    "utilities",
 )

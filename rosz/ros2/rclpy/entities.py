@@ -37,10 +37,7 @@ class Publisher:
     """Publish messages on a topic; made by ``Node.create_publisher``."""
 
     def __init__(
-        self,
-        publisher: RoszPublisher[Any],
-        qos_profile: Any,
-        events: dict[str, EventHandler],
+        self, publisher: RoszPublisher[Any], qos_profile: Any, events: dict[str, EventHandler]
     ) -> None:
         self._publisher = publisher
         self.msg_type: type[Any] = publisher.message_type
@@ -120,8 +117,7 @@ class Subscription:
         Raises:
             UnsupportedEventTypeError: There is no such event.
         """
-        group = self.callback_group
-        handlers = handlers_of(self._subscription, callbacks, group, self._wake)
+        handlers = handlers_of(self._subscription, callbacks, self.callback_group, self._wake)
         self._lost = handlers.get("message_lost")
         self.event_handlers = list(handlers.values())
 

@@ -81,11 +81,8 @@ class MessageLostInfo(msgspec.Struct, frozen=True):
     total_count_change: int
 
 
-class IncompatibleTypeInfo(msgspec.Struct, frozen=True):
-    """The other ends whose types differ; the attributes are those of `MessageLostInfo`."""
-
-    total_count: int
-    total_count_change: int
+class IncompatibleTypeInfo(MessageLostInfo, frozen=True):
+    """The other ends whose types differ."""
 
 
 class EventHandler:
@@ -150,10 +147,7 @@ class _EventCallbacks:
     _kinds: tuple[str, ...] = _KINDS
 
     def __init__(
-        self,
-        *,
-        use_default_callbacks: bool = True,
-        **callbacks: Callable[[Any], Any] | None,
+        self, *, use_default_callbacks: bool = True, **callbacks: Callable[[Any], Any] | None
     ) -> None:
         unknown = callbacks.keys() - set(self._kinds)
         if unknown:
@@ -184,11 +178,13 @@ def handlers_of(
     """Return the handlers of an entity's events by their names; all but lost messages count.
 
     Raises:
-        UnsupportedEventTypeError: There is a callback for deadlines or liveliness.
+        UnsupportedEventTypeError: There is a callback for deadlines or liveliness; the entity is
+            closed.
     """
     given = {} if callbacks is None else vars(callbacks)
     for name in ("deadline", "liveliness"):
         if given.get(name) is not None:
+            entity.close()
             raise UnsupportedEventTypeError(
                 f"'{entity.name}' has no {name} events: Zenoh, as with rmw_zenoh, reports none"
             )

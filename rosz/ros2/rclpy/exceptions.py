@@ -4,20 +4,8 @@ from __future__ import annotations
 
 from rosz.errors import InvalidName, RoszError
 
-__all__ = (
-    "InvalidHandle",
-    "InvalidParameterTypeException",
-    "InvalidParameterValueException",
-    "NameValidationException",
-    "NotInitializedException",
-    "ParameterAlreadyDeclaredException",
-    "ParameterException",
-    "ParameterNotDeclaredException",
-    "ParameterUninitializedException",
-    "ROSInterruptException",
-)
-
-NameValidationException = InvalidName
+InvalidServiceNameException = InvalidTopicNameException = NameValidationException = InvalidName
+RCLError = RoszError
 
 
 class NotInitializedException(RoszError):

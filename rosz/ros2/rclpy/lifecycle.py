@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from enum import Enum
-from functools import wraps
+from functools import partialmethod, wraps
 from typing import Any, NamedTuple
 
 from rosz.errors import RoszError
@@ -220,36 +220,28 @@ class LifecycleNodeMixin(ManagedEntity):
         if enable_communication_interface:
             self._rosz_serve(callback_group)
 
+    _rosz_self: Any = property(lambda self: self)  # a node, which the type checker cannot know
+
     def _rosz_serve(self, group: CallbackGroup | None) -> None:
-        node: Any = self
-        name = node.get_fully_qualified_name()
+        name = self._rosz_self.get_fully_qualified_name()
 
         def offer(kind: type[Any], service: str, field: str, value: Callable[[Any], Any]) -> None:
             def respond(request: Any, response: Any) -> Any:
                 setattr(response, field, value(request))
                 return response
 
-            node.create_service(kind, f"{name}/{service}", respond, callback_group=group)
+            self._rosz_self.create_service(kind, f"{name}/{service}", respond, callback_group=group)
 
         offer(srv.ChangeState, "change_state", "success", self._rosz_change_state)
         offer(srv.GetState, "get_state", "current_state", lambda _: _message(self._rosz_state))
-        offer(
-            srv.GetAvailableStates,
-            "get_available_states",
-            "available_states",
-            lambda _: list(map(_message, _STATES.values())),
-        )
+        states = list(map(_message, _STATES.values()))
+        offer(srv.GetAvailableStates, "get_available_states", "available_states", lambda _: states)
         kind, field = srv.GetAvailableTransitions, "available_transitions"
-        offer(
-            kind,
-            "get_available_transitions",
-            field,
-            lambda _: list(map(_description, self._rosz_edges())),
-        )
-        offer(kind, "get_transition_graph", field, lambda _: list(map(_description, _EDGES)))
+        offer(kind, "get_available_transitions", field, lambda _: _described(self._rosz_edges()))
+        offer(kind, "get_transition_graph", field, lambda _: _described(_EDGES))
         # Not `self.create_publisher`, which a subclass may have overridden.
         self._rosz_events = PlainNode.create_publisher(
-            node, TransitionEvent, f"{name}/transition_event", 10
+            self._rosz_self, TransitionEvent, f"{name}/transition_event", 10
         )
 
     def _rosz_edges(self) -> Iterable[_Edge]:
@@ -260,13 +252,17 @@ class LifecycleNodeMixin(ManagedEntity):
         for edge in self._rosz_edges():
             if edge.label == wanted.label or (not wanted.label and edge.number == wanted.id):
                 return self._rosz_run(edge) is _Result.SUCCESS
-        node: Any = self
-        node.get_logger().error(
+        self._rosz_self.get_logger().error(
             f"no transition '{wanted.label or wanted.id}' from the state '{self._rosz_state.label}'"
         )
         return False
 
     def _rosz_trigger(self, label: str) -> _Result:
+        """Pass a transition, and return the result of its callback.
+
+        Raises:
+            TransitionError: The state of the node does not allow it.
+        """
         for edge in self._rosz_edges():
             if edge.label == label:
                 return self._rosz_run(edge)
@@ -290,15 +286,14 @@ class LifecycleNodeMixin(ManagedEntity):
 
     def _rosz_call(self, before: LifecycleState) -> _Result:
         """Call the callback of the present state."""
-        node: Any = self
         name = _CALLBACKS[self._rosz_state.label]
         try:
             result = getattr(self, name)(before)
         except Exception as error:  # noqa: BLE001  # leads to error processing, as in rclpy
-            node.rosz_node.log.report(f"{name} failed", error)
+            self._rosz_self.rosz_node.log.report(f"{name} failed", error)
             return _Result.ERROR
         if not isinstance(result, _Result):
-            node.get_logger().error(
+            self._rosz_self.get_logger().error(
                 f"{name} returned {result!r}; expected a TransitionCallbackReturn"
             )
             return _Result.ERROR
@@ -307,8 +302,7 @@ class LifecycleNodeMixin(ManagedEntity):
     def _rosz_enter(self, edge: _Edge) -> None:
         self._rosz_state = edge.goal
         if self._rosz_events is not None:
-            node: Any = self
-            now = node.get_clock().now().nanoseconds
+            now = self._rosz_self.get_clock().now().nanoseconds
             changed = _description(edge)
             self._rosz_events.publish(
                 TransitionEvent(now, changed.transition, changed.start_state, changed.goal_state)
@@ -322,32 +316,11 @@ class LifecycleNodeMixin(ManagedEntity):
                 return result
         return _Result.SUCCESS
 
-    def trigger_configure(self) -> _Result:
-        """Configure the node.
-
-        Returns:
-            The result of `on_configure`.
-
-        Raises:
-            TransitionError: The state of the node does not allow it; likewise for the others.
-        """
-        return self._rosz_trigger("configure")
-
-    def trigger_cleanup(self) -> _Result:
-        """Undo the configuration of the node."""
-        return self._rosz_trigger("cleanup")
-
-    def trigger_activate(self) -> _Result:
-        """Activate the node."""
-        return self._rosz_trigger("activate")
-
-    def trigger_deactivate(self) -> _Result:
-        """Deactivate the node."""
-        return self._rosz_trigger("deactivate")
-
-    def trigger_shutdown(self) -> _Result:
-        """Finalize the node."""
-        return self._rosz_trigger("shutdown")
+    trigger_configure = partialmethod(_rosz_trigger, "configure")
+    trigger_cleanup = partialmethod(_rosz_trigger, "cleanup")
+    trigger_activate = partialmethod(_rosz_trigger, "activate")
+    trigger_deactivate = partialmethod(_rosz_trigger, "deactivate")
+    trigger_shutdown = partialmethod(_rosz_trigger, "shutdown")
 
     def add_managed_entity(self, entity: ManagedEntity) -> None:
         """Let an entity take part in the transitions.
@@ -367,19 +340,18 @@ class LifecycleNodeMixin(ManagedEntity):
 
         The arguments are those of `rclpy.node.Node.create_publisher`.
         """
-        node: Any = self
-        publisher: Any = PlainNode.create_publisher(
-            node, msg_type, topic, qos_profile, publisher_class=LifecyclePublisher, **options
+        options |= {"publisher_class": LifecyclePublisher}
+        made: Any = PlainNode.create_publisher(
+            self._rosz_self, msg_type, topic, qos_profile, **options
         )
-        self.add_managed_entity(publisher)
-        return publisher  # type: ignore[no-any-return]
+        self.add_managed_entity(made)
+        return made  # type: ignore[no-any-return]
 
     def destroy_lifecycle_publisher(self, publisher: LifecyclePublisher) -> bool:
         """Close a publisher; return whether it belonged to the node."""
         if publisher in self._rosz_managed:
             self._rosz_managed.remove(publisher)
-        node: Any = self
-        return bool(node.destroy_publisher(publisher))
+        return bool(self._rosz_self.destroy_publisher(publisher))
 
 
 class LifecycleNode(LifecycleNodeMixin, PlainNode):
@@ -408,6 +380,10 @@ def _description(edge: _Edge) -> TransitionDescription:
     return TransitionDescription(
         Transition(edge.number, edge.label), _message(edge.start), _message(edge.goal)
     )
+
+
+def _described(edges: Iterable[_Edge]) -> list[TransitionDescription]:
+    return list(map(_description, edges))
 
 
 Node = LifecycleNode

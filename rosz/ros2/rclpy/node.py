@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NoReturn, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from rosz import names
 from rosz.errors import UsageError
@@ -16,13 +16,18 @@ from rosz.ros2.rclpy.events import (
     GuardCondition,
     PublisherEventCallbacks,
     SubscriptionEventCallbacks,
-    UnsupportedEventTypeError,
     handlers_of,
 )
 from rosz.ros2.rclpy.exceptions import NotInitializedException
 from rosz.ros2.rclpy.logging import RcutilsLogger, serve_logger_levels, write_as_rclpy
 from rosz.ros2.rclpy.parameter import NodeParameters, Parameter
-from rosz.ros2.rclpy.qos import QoSOverridingOptions, QoSProfile, override_qos, to_qos
+from rosz.ros2.rclpy.qos import (
+    QoSOverridingOptions,
+    QoSProfile,
+    TopicEndpointInfo,
+    override_qos,
+    to_qos,
+)
 from rosz.ros2.rclpy.time import Clock, Rate, ROSClock
 from rosz.wire import Kind, Token
 
@@ -90,11 +95,6 @@ class Node(NodeParameters):
             for name, value in overrides.items():
                 if not self.has_parameter(name):
                     self.declare_parameter(name, value)
-
-    def __getattr__(self, name: str) -> NoReturn:
-        raise AttributeError(
-            f"'{type(self).__name__}' has no '{name}': rosz's rclpy.node.Node lacks it"
-        )
 
     def rosz_entities(self) -> Iterator[executors.Entity]:
         """Yield the entities with callbacks, timers first, which is rclpy's order."""
@@ -171,11 +171,7 @@ class Node(NodeParameters):
         qos_profile = self._rosz_qos("publisher", topic, qos_profile, qos_overriding_options)
         raw = self.rosz_node.publisher(topic, msg_type, qos=to_qos(qos_profile))
         group = callback_group or self.default_callback_group
-        try:
-            events = handlers_of(raw, event_callbacks, group, self.rosz_wake)
-        except UnsupportedEventTypeError:
-            raw.close()
-            raise
+        events = handlers_of(raw, event_callbacks, group, self.rosz_wake)
         return self.rosz_add(publisher_class(raw, qos_profile, events))
 
     def _rosz_qos(
@@ -225,11 +221,7 @@ class Node(NodeParameters):
             group=callback_group or self.default_callback_group,
             wake=self.rosz_wake,
         )
-        try:
-            subscription.follow(event_callbacks)
-        except UnsupportedEventTypeError:
-            subscription.destroy()
-            raise
+        subscription.follow(event_callbacks)
         return self.rosz_add(subscription)
 
     def create_timer(
@@ -444,6 +436,16 @@ class Node(NodeParameters):
     def count_subscribers(self, topic_name: str) -> int:
         """Return the number of subscriptions of a topic."""
         return len(self._rosz_entities(Kind.SUBSCRIPTION, topic_name))
+
+    def get_publishers_info_by_topic(self, topic_name: str, **_: bool) -> list[TopicEndpointInfo]:
+        """Return the publishers of a topic."""
+        return [*map(TopicEndpointInfo, self._rosz_entities(Kind.PUBLISHER, topic_name))]
+
+    def get_subscriptions_info_by_topic(
+        self, topic_name: str, **_: bool
+    ) -> list[TopicEndpointInfo]:
+        """Return the subscriptions of a topic."""
+        return [*map(TopicEndpointInfo, self._rosz_entities(Kind.SUBSCRIPTION, topic_name))]
 
     def _rosz_entities(self, kind: Kind, topic: str) -> list[Token]:
         name = self.resolve_topic_name(topic)

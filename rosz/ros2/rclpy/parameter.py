@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from enum import IntEnum
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from msgspec.structs import replace
 
@@ -78,6 +78,7 @@ class Parameter:
             )
 
     def __init__(self, name: str, type_: Type | None = None, value: Any = None) -> None:
+        value = _plain(value)
         actual = _type_of(value)
         if type_ is not None and type_ is not actual and not type_.check(value):
             raise UsageError(
@@ -132,6 +133,7 @@ class Parameter:
 
 
 _Type = Parameter.Type
+_Callback: TypeAlias = Callable[[list[Parameter]], Any]
 
 
 def _field(kind: Parameter.Type) -> str:
@@ -139,7 +141,21 @@ def _field(kind: Parameter.Type) -> str:
     return f"{kind.name.lower()}_value"
 
 
+def _plain(value: Any) -> Any:
+    """Return a value without subclasses of Python's types in it, such as enums and numpy's."""
+    if isinstance(value, list | tuple):
+        return type(value)(map(_plain, value))
+    plain: dict[type, Callable[[Any], Any]] = {
+        int: int.__int__,
+        float: float.__float__,
+        str: str.__str__,
+    }
+    kind = next((kind for kind in type(value).__mro__ if kind in plain or kind is bool), bool)
+    return value if kind is bool else plain[kind](value)
+
+
 def _type_of(value: Any) -> Parameter.Type:
+    value = _plain(value)
     if value is None:
         return _Type.NOT_SET
     is_array = isinstance(value, Sequence | array.array) and not isinstance(value, str | bytes)
@@ -245,10 +261,10 @@ class NodeParameters:
         self._rosz_update_soon = call_soon
         self._rosz_known: dict[str, Parameter] = {}
         self._rosz_descriptors: dict[str, ParameterDescriptor] = {}
-        self._rosz_before: list[Callable[[list[Parameter]], list[Parameter]]] = []
-        self._rosz_checks: list[Callable[[list[Parameter]], Any]] = []
+        self._rosz_before: list[_Callback] = []
+        self._rosz_checks: list[_Callback] = []
         node.parameter_owner = _DeclaredParameters(self, call_soon)
-        self._rosz_after: list[Callable[[list[Parameter]], object]] = []
+        self._rosz_after: list[_Callback] = []
 
     def declare_parameter(
         self,
@@ -431,35 +447,27 @@ class NodeParameters:
                 return _outside(parameter, limits)
         return ""
 
-    def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+    def add_on_set_parameters_callback(self, callback: _Callback) -> None:
         """Call a function that may refuse parameters before they are set."""
         self._rosz_checks.insert(0, callback)
 
-    def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+    def remove_on_set_parameters_callback(self, callback: _Callback) -> None:
         """Remove a function of `add_on_set_parameters_callback`."""
         self._rosz_checks.remove(callback)
 
-    def add_pre_set_parameters_callback(
-        self, callback: Callable[[list[Parameter]], list[Parameter]]
-    ) -> None:
+    def add_pre_set_parameters_callback(self, callback: _Callback) -> None:
         """Call a function that returns which parameters to set instead of given ones."""
         self._rosz_before.insert(0, callback)
 
-    def remove_pre_set_parameters_callback(
-        self, callback: Callable[[list[Parameter]], list[Parameter]]
-    ) -> None:
+    def remove_pre_set_parameters_callback(self, callback: _Callback) -> None:
         """Remove a function of `add_pre_set_parameters_callback`."""
         self._rosz_before.remove(callback)
 
-    def add_post_set_parameters_callback(
-        self, callback: Callable[[list[Parameter]], object]
-    ) -> None:
+    def add_post_set_parameters_callback(self, callback: _Callback) -> None:
         """Call a function with the parameters after they were set."""
         self._rosz_after.insert(0, callback)
 
-    def remove_post_set_parameters_callback(
-        self, callback: Callable[[list[Parameter]], object]
-    ) -> None:
+    def remove_post_set_parameters_callback(self, callback: _Callback) -> None:
         """Remove a function of `add_post_set_parameters_callback`."""
         self._rosz_after.remove(callback)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any, TypeVar
 
+from rosz import names
 from rosz.errors import ClosedError, WaitTimeout
 from rosz.message import Message
 from rosz.ros2.rclpy import arguments
@@ -61,9 +62,7 @@ def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None 
     (context or get_default_context()).shutdown()
 
 
-def try_shutdown(*, context: Context | None = None) -> None:
-    """Close everything; a second call has no effect."""
-    shutdown(context=context)
+try_shutdown = shutdown
 
 
 def ok(*, context: Context | None = None) -> bool:
@@ -181,6 +180,11 @@ def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
         args: Command line with the program name; that of the process when not given.
     """
     return arguments.remove_ros_args(sys.argv if args is None else args)
+
+
+def expand_topic_name(topic_name: str, node_name: str, node_namespace: str) -> str:
+    """Return the global name of a topic of a node; an `InvalidName` if it is not legal."""
+    return names.resolve(topic_name, names.join(node_namespace, node_name))
 
 
 def get_rmw_implementation_identifier() -> str:

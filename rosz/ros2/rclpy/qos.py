@@ -12,6 +12,7 @@ from rosz.msgs.rcl_interfaces.msg import ParameterDescriptor, SetParametersResul
 from rosz.qos import FOREVER as _FOREVER
 from rosz.qos import QoS
 from rosz.ros2.rclpy.time import Duration, Infinite
+from rosz.wire import Token, format_token, gid
 
 
 class HistoryPolicy(IntEnum):
@@ -64,6 +65,10 @@ _POLICIES: dict[str, tuple[type[IntEnum], IntEnum]] = {
     "durability": (DurabilityPolicy, DurabilityPolicy.VOLATILE),
     "liveliness": (LivelinessPolicy, LivelinessPolicy.SYSTEM_DEFAULT),
 }
+for _policy_type, _ in _POLICIES.values():
+    for _member in tuple(_policy_type):  # the older names
+        _kind = _policy_type.__name__.removesuffix("Policy").upper()
+        setattr(_policy_type, f"RMW_QOS_POLICY_{_kind}_{_member.name}", _member)
 _SPANS = ("lifespan", "deadline", "liveliness_lease_duration")
 
 
@@ -154,6 +159,29 @@ def to_qos(profile: QoSProfile | int) -> QoS:
         liveliness="manual_by_topic" if manual else "automatic",
         lease=_span(profile.liveliness_lease_duration),
     )
+
+
+TopicEndpointTypeEnum = IntEnum("TopicEndpointTypeEnum", "INVALID PUBLISHER SUBSCRIPTION", start=0)
+
+
+class TopicEndpointInfo:
+    """A publisher or subscription of a topic: its node, type, GID and profile."""
+
+    def __init__(self, token: Token) -> None:
+        qos = token.qos or QoS()
+        self.node_name: str = token.node
+        self.node_namespace: str = token.namespace
+        self.topic_type: str = token.type_name
+        self.topic_type_hash: str = token.type_hash
+        self.endpoint_type: IntEnum = TopicEndpointTypeEnum[token.kind.name]
+        self.endpoint_gid: list[int] = list(gid(format_token(token)))
+        self.qos_profile: QoSProfile = QoSProfile(
+            depth=qos.depth,
+            lifespan=Duration(nanoseconds=qos.lifespan),
+            deadline=Duration(nanoseconds=qos.deadline),
+            liveliness_lease_duration=Duration(nanoseconds=qos.lease),
+            **{name: kind[getattr(qos, name).upper()] for name, (kind, _) in _POLICIES.items()},
+        )
 
 
 class InvalidQosOverridesError(RoszError):
@@ -258,6 +286,7 @@ qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPol
 class QoSPresetProfiles(Enum):
     """The named profiles of ROS 2; ``.value`` is the profile."""
 
+    DEFAULT = QoSProfile(depth=10)
     SYSTEM_DEFAULT = qos_profile_system_default
     SENSOR_DATA = qos_profile_sensor_data
     SERVICES_DEFAULT = qos_profile_services_default

@@ -123,6 +123,50 @@ def test_nodes_of_rclpy(network: Network) -> None:
     assert program.lines[-2:] == ["yaw 1.0", "True"]
 
 
+def test_transforms_that_rclpy_awaits(network: Network) -> None:
+    program = network.program(
+        """
+        import rosz.ros1
+        import rclpy
+        from geometry_msgs.msg import TransformStamped
+        from rclpy.time import Time
+        from tf2_ros import Buffer
+
+        rclpy.init()
+        node = rclpy.create_node("n")
+        buffer = Buffer(node=node)
+        made = TransformStamped()
+        made.header.frame_id, made.child_frame_id = "odom", "base"
+        made.transform.translation.x = 2.0
+
+        async def look():
+            timer.cancel()
+            node.create_timer(0.01, lambda: buffer.set_transform(made, "test"))
+            found = await buffer.lookup_transform_async("odom", "base", Time())
+            return found.transform.translation.x
+
+        def begin():
+            tasks.append(node.executor.create_task(look))
+
+        timer = node.create_timer(0.01, begin)
+        tasks = []
+        while not (tasks and tasks[0].done()):
+            rclpy.spin_once(node)
+        print(tasks[0].result(), len(buffer.frames._waiters))
+        future = buffer.wait_for_transform_async("odom", "laser", Time())
+        print(future.done(), len(buffer.frames._waiters))
+        future.cancel()
+        print(len(buffer.frames._waiters))
+        rclpy.spin_until_future_complete(
+            node, buffer.wait_for_transform_async("odom", "base", Time())
+        )
+        rclpy.shutdown()
+        """
+    )
+    assert program.exit_code() == 0, program.output
+    assert program.lines == ["2.0 0", "False 1", "0"]
+
+
 def test_buffers_of_other_nodes(network: Network) -> None:
     """A buffer serves its frames, and a buffer server looks transforms up for clients."""
     network.program(

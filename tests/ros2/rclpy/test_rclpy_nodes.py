@@ -341,10 +341,25 @@ def test_names_and_clock(start: Start) -> None:
         rate.sleep()
 
 
-def test_missing_attributes_are_named(world: World) -> None:
-    with pytest.raises(AttributeError, match="add_waitable"):
-        _ = world.node.add_waitable
-    assert not hasattr(world.node, "my_own")
+def test_the_ends_of_a_topic(world: World) -> None:
+    node = world.node
+    profile = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_publisher(Int32, "n", profile)
+    node.create_subscription(Int32, "n", lambda _: None, 1)
+    (publisher,) = node.get_publishers_info_by_topic("n")
+    assert (publisher.node_name, publisher.node_namespace) == ("robot", "/")
+    assert (publisher.topic_type, publisher.endpoint_type.name) == (
+        "std_msgs/msg/Int32",
+        "PUBLISHER",
+    )
+    assert publisher.topic_type_hash.startswith("RIHS01_")
+    assert len(publisher.endpoint_gid) == 16
+    assert publisher.qos_profile.depth == 3
+    assert publisher.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    (subscription,) = node.get_subscriptions_info_by_topic("/n", no_mangle=True)
+    assert subscription.endpoint_type.name == "SUBSCRIPTION"
+    assert subscription.endpoint_gid != publisher.endpoint_gid
+    assert node.get_publishers_info_by_topic("other") == []
 
 
 def test_no_node_without_init() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,38 @@ def test_profiles() -> None:
         qos.QoSProfile(depth=1, reliable=True)
     with pytest.raises(UsageError, match="got str"):
         qos.to_qos("reliable")  # type: ignore[arg-type]
+
+
+def test_older_names_of_policies() -> None:
+    names = vars(qos.QoSReliabilityPolicy)
+    assert names["RMW_QOS_POLICY_RELIABILITY_RELIABLE"] is qos.ReliabilityPolicy.RELIABLE
+    assert "RMW_QOS_POLICY_DURABILITY_VOLATILE" in vars(qos.DurabilityPolicy)
+    assert [policy.name for policy in qos.HistoryPolicy][1:3] == ["KEEP_LAST", "KEEP_ALL"]
+
+
+class _Text(str, Enum):  # noqa: UP042  # its text is not its value
+    MAP = "map"
+
+
+class _Number(float):
+    pass
+
+
+@pytest.mark.parametrize(
+    ("value", "plain", "kind"),
+    [
+        (qos.ReliabilityPolicy.BEST_EFFORT, 2, Type.INTEGER),
+        (_Text.MAP, "map", Type.STRING),
+        (_Number(1.5), 1.5, Type.DOUBLE),
+        ([_Number(1), 2.0], [1.0, 2.0], Type.DOUBLE_ARRAY),
+        ((_Text.MAP,), ("map",), Type.STRING_ARRAY),
+    ],
+)
+def test_parameters_of_derived_types(value: object, plain: object, kind: Type) -> None:
+    parameter = Parameter("p", value=value)
+    assert (parameter.value, parameter.type_) == (plain, kind)
+    assert "class '_" not in repr(type(parameter.value))
+    assert Type.from_parameter_value(value) is kind
 
 
 @pytest.mark.parametrize(

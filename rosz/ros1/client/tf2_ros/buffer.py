@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from rosz import transforms
@@ -26,12 +27,13 @@ class Buffer(BufferCore, BufferInterface):
         cache_time: Age up to which transforms are kept; ten seconds when not given.
         debug: Whether the node serves the state of the frames, as ``~tf2_frames``; the first such
             buffer of the node does.
+        node: Not used: the listener has the node.
 
     Attributes:
         clock: Clock to wait by; that of the node of the listener.
     """
 
-    def __init__(self, cache_time: Any = None, debug: bool = True) -> None:
+    def __init__(self, cache_time: Any = None, debug: Any = True, *, node: Any = None) -> None:  # noqa: ARG002  # ROS 2's
         super().__init__(cache_time)
         self.clock: Clock = Clock()
         if debug:
@@ -97,6 +99,23 @@ class Buffer(BufferCore, BufferInterface):
         self._wait(lambda: self.can_transform_full_core(*call)[0], timeout)
         answer = self.can_transform_full_core(*call)
         return answer if return_debug_tuple else answer[0]
+
+    def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Any:
+        """Return a future of rclpy that is done when a transform is known."""
+        future = import_module("rclpy.task").Future()
+        call = target_frame, source_frame, time
+        forget = self.frames.when(
+            lambda: self.can_transform_core(*call)[0], lambda: future.set_result(True)
+        )
+        future.add_done_callback(lambda _: forget())
+        return future
+
+    async def lookup_transform_async(
+        self, target_frame: str, source_frame: str, time: Any
+    ) -> TransformStamped:
+        """Return a transform when it is known; see `lookup_transform`."""
+        await self.wait_for_transform_async(target_frame, source_frame, time)
+        return self.lookup_transform_core(target_frame, source_frame, time)
 
     def _wait(self, condition: Callable[[], bool], timeout: Any) -> None:
         if timeout is not None and nanoseconds(timeout) > 0:

@@ -186,11 +186,7 @@ class BufferInterface:
         return convert(moved, new_type) if new_type else moved
 
     def lookup_transform(
-        self,
-        target_frame: str,
-        source_frame: str,
-        time: Any,
-        timeout: Any = None,
+        self, target_frame: str, source_frame: str, time: Any, timeout: Any = None
     ) -> TransformStamped:
         """Return the transform from the source frame to the target frame.
 
