@@ -76,11 +76,11 @@ class ActionsPage:
             )
             with ui.row().classes("w-full items-center gap-3"):
                 self._send_button = ui.button("Send goal", icon="send", on_click=self._send)
-                self._send_button.props("no-caps").disable()
+                self._send_button.disable()
                 self._cancel_button = ui.button(
                     "Cancel all", icon="cancel", on_click=lambda: self._cancel("")
                 )
-                self._cancel_button.props("no-caps outline").disable()
+                self._cancel_button.props("outline").disable()
                 with self._cancel_button:
                     ui.tooltip("Ends the goals of all clients")
 
@@ -167,9 +167,8 @@ class _GoalCard:
                 self._state = ui.badge(goal.state, color="info").classes("text-sm")
                 self._time = ui.label("").classes("rosz-soft rosz-number text-sm")
                 ui.space()
-                self._cancel = ui.button("Cancel", on_click=lambda: cancel(goal.id)).props(
-                    "no-caps flat dense"
-                )
+                self._cancel = ui.button("Cancel", on_click=lambda: cancel(goal.id))
+                self._cancel.props("flat dense")
             ui.label(f"{time.strftime('%H:%M:%S', time.localtime(goal.began))}  {goal.id}").classes(
                 "rosz-mono rosz-soft break-all"
             )
@@ -238,6 +237,4 @@ class _OtherGoals:
             ui.badge(row.state, color=_COLORS.get(row.state, "info"))
             ui.label(row.id).classes("rosz-mono rosz-soft break-all grow")
             if row.running:
-                ui.button("Cancel", on_click=lambda: self._cancel(row.id)).props(
-                    "no-caps flat dense"
-                )
+                ui.button("Cancel", on_click=lambda: self._cancel(row.id)).props("flat dense")

@@ -53,7 +53,7 @@ class DrivePage:
                 )
                 self._select.classes("grow min-w-52")
                 self._speed, self._rate = (
-                    ui.number(unit, value=speed, min=0.01, step=0.1).props("dense").classes("w-20")
+                    ui.number(unit, value=speed, min=0.01, step=0.1).classes("w-20")
                     for unit, speed in (("m/s", 1.0), ("rad/s", 1.5))
                 )
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):

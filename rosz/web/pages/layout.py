@@ -57,6 +57,12 @@ ENTRIES = (
 
 _STYLE = Path(__file__).with_name("style.css")
 
+# The look of the controls of all pages.
+ui.button.default_props("no-caps")
+ui.select.default_props("dense options-dense")
+for _control in (ui.input, ui.number, ui.switch):
+    _control.default_props("dense")
+
 
 class Frame:
     """One opened page: its header and navigation, and its resources until it is closed.
@@ -251,7 +257,7 @@ def card(title: str, classes: str = "p-4 gap-2") -> ui.column:
 
 def tool_button(text: str, icon: str, act: Callable[[], Any]) -> ui.button:
     """Add a flat button, as rows of tools have them."""
-    return ui.button(text, icon=icon, on_click=act).props("flat dense no-caps")
+    return ui.button(text, icon=icon, on_click=act).props("flat dense")
 
 
 def add_table(columns: list[dict[str, Any]], key: str = "name", most: int = 12) -> ui.table:
@@ -271,8 +277,7 @@ def add_select(
 ) -> ui.select:
     """Add a choice of names, which has only the chosen one yet; see `offer_options`."""
     names = [chosen] if chosen else []
-    select = ui.select(names, value=chosen or None, label=label, on_change=on_change, **options)
-    return select.props("dense options-dense")
+    return ui.select(names, value=chosen or None, label=label, on_change=on_change, **options)
 
 
 def offer_options(select: ui.select, names: Iterable[str]) -> list[str]:

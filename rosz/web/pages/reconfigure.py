@@ -136,12 +136,12 @@ class ReconfigurePage:
             options = {choice.value: choice.name for choice in setting.choices}
             options.setdefault(value, str(value))
             select = ui.select(options, value=value, on_change=change).classes("grow min-w-40")
-            return [select.props(f"dense options-dense {label}")]
+            return [select.props(label)]
         if setting.kind == "bool":
-            return [ui.switch(value=bool(value), on_change=change).props(label)]
+            return [ui.switch(value=bool(value), on_change=change).props(label, remove="dense")]
         if setting.kind == "str":
             text = ui.input(value=str(value), on_change=change).classes("grow min-w-40")
-            return [text.props(f"dense debounce=400 {label}")]
+            return [text.props(f"debounce=400 {label}")]
         whole = setting.kind == "int"
         editors: list[ValueElement[Any]] = []
         low, high = float(setting.min or 0), float(setting.max or 0)
@@ -160,7 +160,7 @@ class ReconfigurePage:
             max=high if bounded else None,
             on_change=change,
         )
-        editors.append(number.props(f"dense debounce=400 {label}").classes("w-28"))
+        editors.append(number.props(f"debounce=400 {label}").classes("w-28"))
         return editors
 
     def _change(self, setting: Setting, value: Any) -> None:

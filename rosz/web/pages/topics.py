@@ -54,14 +54,14 @@ class TopicsPage:
                     value=field,
                     placeholder="pose/position",
                     on_change=lambda change: self._choose_field(change.value or ""),
-                ).props("dense clearable debounce=400").classes("w-40")
+                ).props("clearable debounce=400").classes("w-40")
                 ui.input(
                     "Only if",
                     value=condition,
                     placeholder="linear/x > 0.5",
                     on_change=lambda change: self._choose_condition(change.value or ""),
-                ).props("dense clearable debounce=600").classes("w-40")
-                self._frozen = ui.switch("Freeze").props("dense")
+                ).props("clearable debounce=600").classes("w-40")
+                self._frozen = ui.switch("Freeze")
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
                 self._echo = _Echo()
                 self._publish = _Publish(system, frame)
@@ -224,22 +224,17 @@ class _Publish:
         frame.keep(self)
         with layout.card("Publish"):
             with ui.row().classes("w-full gap-3"):
-                self._topic = ui.input("Topic").props("dense").classes("grow")
-                self._type = (
-                    ui.input("Type", placeholder="std_msgs/String").props("dense").classes("grow")
-                )
+                self._topic = ui.input("Topic").classes("grow")
+                self._type = ui.input("Type", placeholder="std_msgs/String").classes("grow")
             self._form = MessageForm(
                 system.node, "Fields in YAML; those left out have their default value"
             )
             with ui.row().classes("w-full items-center gap-3"):
-                ui.button("Fill in", on_click=self._fill).props("flat no-caps")
-                ui.button("Publish once", icon="send", on_click=self._send).props("no-caps")
-                self._rate = (
-                    ui.number("Hz", value=10, min=0.01, max=_FASTEST).props("dense").classes("w-16")
-                )
-                self._repeat = ui.button("Repeat", icon="repeat", on_click=self._toggle).props(
-                    "outline no-caps"
-                )
+                ui.button("Fill in", on_click=self._fill).props("flat")
+                ui.button("Publish once", icon="send", on_click=self._send)
+                self._rate = ui.number("Hz", value=10, min=0.01, max=_FASTEST).classes("w-16")
+                self._repeat = ui.button("Repeat", icon="repeat", on_click=self._toggle)
+                self._repeat.props("outline")
                 self._sent = ui.label("").classes("rosz-soft text-sm")
         ui.timer(0.5, self._count)
 
