@@ -6,7 +6,7 @@ import json
 import logging
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 from urllib.parse import urlencode
 
 from nicegui import run, ui
@@ -229,6 +229,29 @@ class Frame:
         if done:
             ui.notify(done, type="positive")
         return result
+
+
+class Opened(Generic[T]):
+    """At most one thing that a page has open; another takes its place, and it ends with the page.
+
+    Attributes:
+        value: What is open; None for nothing.
+    """
+
+    def __init__(self, frame: Frame) -> None:
+        self.value: T | None = None
+        frame.keep(self)
+
+    def set(self, value: T) -> None:
+        """Close what is open, and keep another."""
+        self.close()
+        self.value = value
+
+    def close(self) -> None:
+        """Close what is open."""
+        value, self.value = self.value, None
+        if value is not None:
+            value.close()
 
 
 def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.column:
