@@ -6,5 +6,3 @@ replies; ``frames`` listens to transforms. May import everything up to ``rosz.in
 
 from rosz.doctor.examine import Examination, examine
 from rosz.doctor.machine import Finding, listed
-
-__all__ = ("Examination", "Finding", "examine", "listed")

@@ -53,7 +53,7 @@ def examine(examination: Examination) -> Iterator[Finding]:
     try:
         session = open_session(environment)
     except TransportError as fault:
-        yield warning(
+        yield from warning(
             "nobody-there",
             "no process is on this network: there are no nodes to examine",
             [str(fault)],

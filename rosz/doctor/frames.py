@@ -66,11 +66,10 @@ def check_frames(session: Session, survey: Survey, seconds: float) -> Iterator[F
             token = publishers.get(publisher)
             source = f"{token.node_name} ({survey.address(token)})" if token else "a new node"
             lines.append(f"{frame} is in {parent}, says {source}")
-    if lines:
-        yield error(
-            "two-parents",
-            "frames have two parents at the same time: their transforms jump between both",
-            lines,
-            "let one node publish each frame: end the other, or have it publish another frame"
-            " ('rosz tf tree' shows the tree)",
-        )
+    yield from error(
+        "two-parents",
+        "frames have two parents at the same time: their transforms jump between both",
+        lines,
+        "let one node publish each frame: end the other, or have it publish another frame"
+        " ('rosz tf tree' shows the tree)",
+    )

@@ -9,6 +9,7 @@ import stat
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -59,14 +60,18 @@ class Finding(msgspec.Struct, frozen=True):
     remedy: str
 
 
-def error(name: str, text: str, evidence: Iterable[str], remedy: str) -> Finding:
-    """Return a finding about a fault."""
-    return Finding(name, "error", text, tuple(evidence), remedy)
+def _find(
+    level: Level, name: str, text: str, evidence: Iterable[str], remedy: str
+) -> Iterator[Finding]:
+    """Yield a finding; nothing without evidence."""
+    if lines := tuple(evidence):
+        yield Finding(name, level, text, lines, remedy)
 
 
-def warning(name: str, text: str, evidence: Iterable[str], remedy: str) -> Finding:
-    """Return a finding about something that may be intended."""
-    return Finding(name, "warning", text, tuple(evidence), remedy)
+error = partial(_find, "error")
+"""Yields a finding about a fault."""
+warning = partial(_find, "warning")
+"""Yields a finding about something that may be intended."""
 
 
 def listed(lines: tuple[str, ...]) -> tuple[str, ...]:
@@ -83,8 +88,9 @@ def check_shared_memory(folder: Path = SEGMENTS, least: int = LEAST_FREE) -> Ite
         return  # not Linux: shared memory is elsewhere
     free, size = disk.f_bavail * disk.f_frsize, disk.f_blocks * disk.f_frsize
     if free < least:
-        yield error(
+        yield Finding(
             "shared-memory-full",
+            "error",
             f"{folder} is full: {free / _MIB:.0f} MiB of {size / _MIB:.0f} MiB are free",
             _largest(folder),
             f"remove what is left over there, or give it more: mount -o remount,size=1G {folder}"
@@ -100,14 +106,13 @@ def check_segments(folder: Path = SEGMENTS, born: float = _LOCK_SECONDS) -> Iter
             with suppress(OSError):  # removed meanwhile, or not readable
                 if path.stat().st_ctime < time.time() - born and _is_unlocked(path, "rb"):
                     left.append(f"{path}, {path.stat().st_size} bytes")
-    if left:
-        count = "1 segment" if len(left) == 1 else f"{len(left)} segments"
-        yield warning(
-            "stale-lock",
-            f"{count} of shared memory left by processes that died",
-            left,
-            "they go when the next rosz process of their owner starts; or remove them by hand",
-        )
+    count = "1 segment" if len(left) == 1 else f"{len(left)} segments"
+    yield from warning(
+        "stale-lock",
+        f"{count} of shared memory left by processes that died",
+        left,
+        "they go when the next rosz process of their owner starts; or remove them by hand",
+    )
 
 
 def _is_unlocked(path: Path, mode: str) -> bool:
@@ -120,29 +125,28 @@ def _is_unlocked(path: Path, mode: str) -> bool:
     return True
 
 
-def _largest(folder: Path) -> list[str]:
+def _largest(folder: Path) -> tuple[str, ...]:
     sizes: list[tuple[int, str]] = []
     with suppress(OSError):
         for path in folder.iterdir():
             with suppress(OSError):
                 sizes.append((path.stat().st_size, path.name))
-    return [f"{folder / name}: {size / _MIB:.1f} MiB" for size, name in sorted(sizes)[:-4:-1]]
+    return tuple(f"{folder / name}: {size / _MIB:.1f} MiB" for size, name in sorted(sizes)[:-4:-1])
 
 
 def check_package_path(environment: Environment) -> Iterator[Finding]:
     """Find folders on the package path that do not exist."""
-    missing = [root for root in environment.package_roots if not root.is_dir()]
-    if missing:
-        yield warning(
-            "missing-path",
-            "ROSZ_PACKAGE_PATH or ROS_PACKAGE_PATH names what is not a folder: its packages are"
-            " not found",
-            [
-                f"{root}: {'it is a file' if root.exists() else 'it does not exist'}"
-                for root in missing
-            ],
-            "correct the variable where the shell sets it (~/.bashrc, setup.bash)",
-        )
+    yield from warning(
+        "missing-path",
+        "ROSZ_PACKAGE_PATH or ROS_PACKAGE_PATH names what is not a folder: its packages are"
+        " not found",
+        [
+            f"{root}: {'it is a file' if root.exists() else 'it does not exist'}"
+            for root in environment.package_roots
+            if not root.is_dir()
+        ],
+        "correct the variable where the shell sets it (~/.bashrc, setup.bash)",
+    )
 
 
 def check_namespace(environment: Environment) -> Iterator[Finding]:
@@ -150,7 +154,7 @@ def check_namespace(environment: Environment) -> Iterator[Finding]:
     try:
         names.check(environment.namespace)
     except InvalidName as fault:
-        yield error(
+        yield from error(
             "refused-name",
             f"no node starts here, as ROS_NAMESPACE is '{environment.namespace}'",
             [str(fault)],
@@ -162,11 +166,9 @@ def check_stopped(environment: Environment) -> Iterator[Finding]:
     """Find processes of this machine that are stopped, as by Ctrl-Z."""
     peers = LocalPeers.read(environment.rendezvous)
     stopped = sorted({peer.pid for peer in peers.stopped})
-    if not stopped:
-        return
     note = f", which holds the meeting point {environment.rendezvous}"
     ids = " ".join(map(str, stopped))
-    yield error(
+    yield from error(
         "stopped-process",
         "stopped processes (Ctrl-Z) receive nothing and do not answer",
         (
@@ -193,7 +195,7 @@ def check_rendezvous(environment: Environment) -> Iterator[Finding]:
     """Find a program at the rendezvous that is not Zenoh."""
     endpoint = environment.rendezvous
     if not why_refused(endpoint, _CONNECT_SECONDS) and not _greets(endpoint, environment):
-        yield error(
+        yield from error(
             "rendezvous-held",
             f"something that is not Zenoh, or hangs, holds the rendezvous {endpoint}",
             [f"it accepts connections and says nothing within {_GREETING_SECONDS:g} s"],
@@ -210,7 +212,7 @@ def check_connect(environment: Environment) -> Iterator[Finding]:
             reason = f"what listens there says nothing within {_GREETING_SECONDS:g} s: it hangs, or"
             reason += " it is not Zenoh"
         if reason:
-            yield error(
+            yield from error(
                 "nobody-listens",
                 f"ROSZ_CONNECT names {endpoint}, where no Zenoh answers",
                 [reason],
@@ -229,7 +231,7 @@ def check_socket_files(environment: Environment) -> Iterator[Finding]:
         lock = Path(f"{path}.lock")
         ours = os.access(path.parent, os.W_OK) and _is_free(lock)
         make = warning if ours else error
-        yield make(
+        yield from make(
             "stale-lock",
             f"the process that listened at {path} died and left its socket",
             [

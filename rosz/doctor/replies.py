@@ -90,22 +90,20 @@ def check_silent(
     silent -= set(query_nodes(session, survey.domain))
     barred = _barred(session, survey, silent, replies)
     silent -= barred
-    if barred:
-        yield warning(
-            "silent-machine",
-            f"{_listed(barred)}, but nothing on those machines answers",
-            sorted(_name(survey, node) for node in barred),
-            "nothing, if the rules there are not to let this machine control nodes (control: in"
-            " rules.yaml); else they hang, or the link to their machine is broken",
-        )
-    if silent:
-        yield error(
-            "unreachable-node",
-            f"{_listed(silent)} without an answer",
-            sorted(_name(survey, node) + stopped_note(survey.processes[node]) for node in silent),
-            "they hang, are stopped (Ctrl-Z: 'fg' lets them go on), or the link to their machine"
-            " is broken: check it with ping, and end them with 'rosz node kill'",
-        )
+    yield from warning(
+        "silent-machine",
+        f"{_listed(barred)}, but nothing on those machines answers",
+        sorted(_name(survey, node) for node in barred),
+        "nothing, if the rules there are not to let this machine control nodes (control: in"
+        " rules.yaml); else they hang, or the link to their machine is broken",
+    )
+    yield from error(
+        "unreachable-node",
+        f"{_listed(silent)} without an answer",
+        sorted(_name(survey, node) + stopped_note(survey.processes[node]) for node in silent),
+        "they hang, are stopped (Ctrl-Z: 'fg' lets them go on), or the link to their machine"
+        " is broken: check it with ping, and end them with 'rosz node kill'",
+    )
 
 
 def _listed(nodes: set[_Node]) -> str:
@@ -134,8 +132,6 @@ def check_visibility(
     survey = take_survey(session, survey.domain, processes=True)
     replies = query_nodes(session, survey.domain)
     blind = _blind(survey, replies, stopped)
-    if not blind:
-        return
     lines: list[str] = []
     for pair in sorted(blind):
         here, there = (_names(survey, zid) for zid in pair)
@@ -143,7 +139,7 @@ def check_visibility(
             lines.append(f"{here} does not see {there}: one way")
         elif pair[0] < pair[1]:
             lines.append(f"{here} and {there} do not see each other")
-    yield error(
+    yield from error(
         "unreachable-peer",
         "running nodes do not see each other",
         lines,
@@ -168,7 +164,7 @@ def check_waiting(session: Session) -> Iterator[Finding]:
     """Find endpoints that cores and nodes connect to and do not reach."""
     for dialler in find_waiting(session, _NODE_TIMEOUT, everywhere=True):
         reason = why_refused(dialler.endpoint) if dialler.host == socket.gethostname() else ""
-        yield warning(
+        yield from warning(
             "waiting-for",
             f"{dialler.host} is waiting for {dialler.endpoint}",
             [reason or "there is no link yet"],
@@ -194,7 +190,7 @@ def check_clocks(survey: Survey, replies: dict[_Node, _NodeReply]) -> Iterator[F
                 f" (± {reply.doubt / _SECOND:.2f} s)"
             )
     for host, evidence in sorted(lines.items()):
-        yield error(
+        yield from error(
             "clock-offset",
             f"the clock of {host} is not the one here: transforms and stamps do not match",
             sorted(evidence),
@@ -251,21 +247,19 @@ def check_stamps(session: Session, survey: Survey, seconds: float) -> Iterator[F
         for token, first in heard
         if not first.damage and not -_AHEAD * _SECOND <= first.age <= _BEHIND * _SECOND
     ]
-    if off:
-        yield error(
-            "clock-offset",
-            "clocks of nodes are not the one here: transforms and stamps do not match",
-            sorted(off),
-            _SYNCHRONISE,
-        )
+    yield from error(
+        "clock-offset",
+        "clocks of nodes are not the one here: transforms and stamps do not match",
+        sorted(off),
+        _SYNCHRONISE,
+    )
     old = [f"{_who(survey, token)}: {first.damage}" for token, first in heard if first.damage]
-    if old:
-        yield error(
-            "old-rmw-zenoh",
-            "nodes send samples in a form that is not that of rmw_zenoh today",
-            sorted(old),
-            "update rmw_zenoh there to that of a current ROS 2 release",
-        )
+    yield from error(
+        "old-rmw-zenoh",
+        "nodes send samples in a form that is not that of rmw_zenoh today",
+        sorted(old),
+        "update rmw_zenoh there to that of a current ROS 2 release",
+    )
 
 
 def _listen(
@@ -325,26 +319,24 @@ def check_replicas(session: Session, domain: int) -> Iterator[Finding]:
         if len(members) == len(digests) and len(set(map(tuple, digests.values()))) <= 1:
             return
     silent = [member for member in members if member.zid not in digests]
-    if silent:
-        yield error(
-            "replica-silent",
-            "replicas of the parameters do not reply: a write may wait for them to time out",
-            sorted(f"{member.label} (session {member.zid})" for member in silent),
-            "they hang or are stopped: let them go on, or end them",
-        )
+    yield from error(
+        "replica-silent",
+        "replicas of the parameters do not reply: a write may wait for them to time out",
+        sorted(f"{member.label} (session {member.zid})" for member in silent),
+        "they hang or are stopped: let them go on, or end them",
+    )
     lines = sorted(
         f"{member.label} (session {member.zid}): other writes in {count} of {BUCKETS} buckets"
         for member in members
         if (count := _differing(member.zid, before, digests))
     )
-    if lines:
-        yield error(
-            "replica-out-of-step",
-            "replicas of the parameters differ, and stay so",
-            lines,
-            "it does not hear what the others write, or they do not hear it: check the link to its"
-            " machine, then start it again",
-        )
+    yield from error(
+        "replica-out-of-step",
+        "replicas of the parameters differ, and stay so",
+        lines,
+        "it does not hear what the others write, or they do not hear it: check the link to its"
+        " machine, then start it again",
+    )
 
 
 def _digests(session: Session, keys: Keys, members: list[ReplicaMember]) -> dict[str, list[int]]:
@@ -385,11 +377,9 @@ def check_versions(session: Session) -> Iterator[Finding]:
             match = _VERSION.match(version)
             if match and (int(match[1]), int(match[2])) < _OLDEST_ZENOH:
                 old.append(f"{kind[0]} {zid}: Zenoh {version}")
-    if old:
-        oldest = ".".join(map(str, _OLDEST_ZENOH))
-        yield warning(
-            "old-zenoh",
-            f"parts of the network have a Zenoh before {oldest}",
-            sorted(old),
-            "update them: latched topics and the presence of nodes rely on what came since",
-        )
+    yield from warning(
+        "old-zenoh",
+        f"parts of the network have a Zenoh before {'.'.join(map(str, _OLDEST_ZENOH))}",
+        sorted(old),
+        "update them: latched topics and the presence of nodes rely on what came since",
+    )

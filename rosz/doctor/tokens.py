@@ -48,7 +48,7 @@ def check_types(survey: Survey) -> Iterator[Finding]:
     """Find topics and services that have more than one type."""
     for word, name, tokens in _by_name(survey):
         if len({token.type_name for token in tokens}) > 1:
-            yield error(
+            yield from error(
                 "type-mismatch",
                 f"{word} {name} has several types: those of different types do not reach each"
                 " other",
@@ -63,7 +63,7 @@ def check_hashes(survey: Survey) -> Iterator[Finding]:
         for type_name in sorted({token.type_name for token in tokens}):
             same = [t for t in tokens if t.type_name == type_name and t.type_hash != NO_HASH]
             if len({token.type_hash for token in same}) > 1:
-                yield error(
+                yield from error(
                     "hash-mismatch",
                     f"{word} {name}: its sides have different definitions of"
                     f" {short_type(type_name)}, and do not reach each other",
@@ -77,7 +77,7 @@ def check_hashless(survey: Survey, distro: str) -> Iterator[Finding]:
     """Find nodes of an old rmw_zenoh, whose tokens have no type hashes; Humble's have none."""
     old = [token for token in survey.view.entities() if token.type_hash == NO_HASH]
     if old and distro != "humble":
-        yield error(
+        yield from error(
             "old-rmw-zenoh",
             "nodes come from an rmw_zenoh without type hashes, that of ROS 2 Humble: they do not"
             " reach those that have them",
@@ -88,13 +88,12 @@ def check_hashless(survey: Survey, distro: str) -> Iterator[Finding]:
 
 def check_unreadable(survey: Survey) -> Iterator[Finding]:
     """Find tokens whose form is not rmw_zenoh's present one."""
-    if survey.damaged:
-        yield error(
-            "unreadable-tokens",
-            "liveliness tokens have a form that is not rmw_zenoh's",
-            survey.damaged,
-            "update rmw_zenoh where they come from, or keep that off this network",
-        )
+    yield from error(
+        "unreadable-tokens",
+        "liveliness tokens have a form that is not rmw_zenoh's",
+        survey.damaged,
+        "update rmw_zenoh where they come from, or keep that off this network",
+    )
 
 
 def check_names(survey: Survey) -> Iterator[Finding]:
@@ -106,13 +105,12 @@ def check_names(survey: Survey) -> Iterator[Finding]:
                 check(name)
             except InvalidName as fault:
                 refused.add(f"{token.node_name} ({survey.address(token)}): {fault}")
-    if refused:
-        yield error(
-            "refused-name",
-            "nodes use names that others refuse: these can neither subscribe nor call",
-            sorted(refused),
-            "start them with legal names: letters, digits, '_' and '/'",
-        )
+    yield from error(
+        "refused-name",
+        "nodes use names that others refuse: these can neither subscribe nor call",
+        sorted(refused),
+        "start them with legal names: letters, digits, '_' and '/'",
+    )
 
 
 def check_duplicates(survey: Survey) -> Iterator[Finding]:
@@ -122,7 +120,7 @@ def check_duplicates(survey: Survey) -> Iterator[Finding]:
         places_of[token.node_name].add(f"{survey.address(token)}, node {token.node_id}")
     for name, places in sorted(places_of.items()):
         if len(places) > 1:
-            yield error(
+            yield from error(
                 "duplicate-node",
                 f"{len(places)} nodes are called {name}",
                 sorted(places),
@@ -143,27 +141,25 @@ def check_one_sided(survey: Survey) -> Iterator[Finding]:
             unheard += () if name.endswith(_OF_ACTIONS) else tokens
         elif kinds != {Kind.SERVICE}:
             unsaid += tokens
-    if unsaid:
-        yield warning(
-            "no-publisher",
-            "nodes wait for topics or services that no node publishes or serves",
-            _alone(survey, unsaid, unheard),
-            "start who is missing, or correct the name or the remapping",
-        )
-    if unheard:
-        yield warning(
-            "no-subscriber",
-            "nodes publish topics that no node subscribes to",
-            _alone(survey, unheard, unsaid),
-            "nothing, if that is meant; else start who is missing, or correct the name",
-        )
+    yield from warning(
+        "no-publisher",
+        "nodes wait for topics or services that no node publishes or serves",
+        _alone(survey, unsaid, unheard),
+        "start who is missing, or correct the name or the remapping",
+    )
+    yield from warning(
+        "no-subscriber",
+        "nodes publish topics that no node subscribes to",
+        _alone(survey, unheard, unsaid),
+        "nothing, if that is meant; else start who is missing, or correct the name",
+    )
 
 
 def check_clock(survey: Survey) -> Iterator[Finding]:
     """Find nodes whose time stands still, since no node publishes /clock."""
     ends = [end for end in survey.view.entities(*_BOTH_SIDES[0]) if end.name == _CLOCK]
     if ends and all(end.kind is Kind.SUBSCRIPTION for end in ends):
-        yield error(
+        yield from error(
             "no-clock",
             "nodes use simulated time and no node publishes /clock: their time stands still",
             sorted(_end(survey, end) for end in ends),
@@ -203,7 +199,7 @@ def check_packages(
         try:
             hash_here = hash_of(tokens[0].kind, type_name)
         except TypeNotFound as fault:
-            yield error(
+            yield from error(
                 "missing-package",
                 f"the type {short_type(type_name)} is not known here: {fault}",
                 ends,
@@ -211,7 +207,7 @@ def check_packages(
                 " package.xml and .msg files are enough",
             )
         except RoszError as fault:
-            yield error(
+            yield from error(
                 "bad-definition",
                 f"the type {short_type(type_name)} cannot be used here: {fault}",
                 ends,
@@ -219,7 +215,7 @@ def check_packages(
             )
         else:
             if type_hash not in {hash_here, NO_HASH} and distro != "humble":
-                yield warning(
+                yield from warning(
                     "other-definition",
                     f"{short_type(type_name)} has another definition here: commands and nodes of"
                     " this machine do not reach those",
@@ -250,7 +246,7 @@ def check_domains(session: Session, survey: Survey) -> Iterator[Finding]:
         for token in others:
             names[token.domain].add(token.node_name)
         lines = [f"domain {domain}: {', '.join(sorted(names[domain]))}" for domain in sorted(names)]
-        yield error("wrong-domain", text, lines, remedy)
+        yield from error("wrong-domain", text, lines, remedy)
         return
     text = "nodes of another domain are what nodes of this one wait for"
     lines = [
@@ -260,8 +256,7 @@ def check_domains(session: Session, survey: Survey) -> Iterator[Finding]:
         if token.qos is not None
         for mate in _lacking(survey, token)
     ]
-    if lines:
-        yield error("wrong-domain", text, sorted(set(lines)), remedy)
+    yield from error("wrong-domain", text, sorted(set(lines)), remedy)
 
 
 def _lacking(survey: Survey, token: Token) -> list[Token]:

@@ -129,9 +129,30 @@ class _ModuleSource:
         self._names.append(class_name(name))
 
     def assemble(self, place: Callable[[str], str | None], origin: str) -> str:
-        """Return the source of the module."""
-        names = sorted(self._names)
-        return _assemble(self._blocks, names, self._module, place, self._catalog, origin)
+        """Return the source of the module; arguments as `message_module`."""
+        body = "\n".join(self._blocks)
+        used = set(re.findall(r"\w+", body))
+        module, catalog = self._module, self._catalog
+        imports = [line for name, line in _ALWAYS.items() if name in used]
+        imports += (
+            f"from rosz.message.runtime import {name} as _{name}" for name in sorted(module.runtime)
+        )
+        late: list[str] = []
+        for full, name in sorted(module.imports.items()):
+            where = place(full)
+            if where is None:
+                spec = catalog.message(full)
+                identity = f'"{message_hash(spec, catalog)}", "{message_md5(spec, catalog)}"'
+                late.append(f'{name} = _type_of("{full}", {identity})')
+                continue
+            plain = class_name(full)
+            alias = "" if name == plain else f" as {name}"
+            imports.append(f"from {where} import {plain}{alias}")
+        head = [f"{MARKER}; do not edit.", f'"""The {origin}."""', ""]
+        head += ["from __future__ import annotations", "", *sorted(imports), ""]
+        head += ["__all__ = (", *(f'    "{name}",' for name in sorted(self._names)), ")"]
+        head += ["", *late] if late else []
+        return re.sub(r"\n{4,}", "\n\n\n", "\n".join(head) + "\n" + body)
 
 
 def _index_module(package: str, types: Mapping[str, Sequence[str]]) -> str:
@@ -164,37 +185,6 @@ def _ordered(specs: Sequence[MessageSpec], catalog: Catalog) -> list[MessageSpec
         if name not in done:
             visit(own[name])
     return list(done.values())
-
-
-def _assemble(
-    blocks: list[str],
-    names: list[str],
-    module: ModuleNames,
-    place: Callable[[str], str | None],
-    catalog: Catalog,
-    origin: str,
-) -> str:
-    body = "\n".join(blocks)
-    used = set(re.findall(r"\w+", body))
-    imports = [line for name, line in _ALWAYS.items() if name in used]
-    imports += (
-        f"from rosz.message.runtime import {name} as _{name}" for name in sorted(module.runtime)
-    )
-    late: list[str] = []
-    for full, name in sorted(module.imports.items()):
-        where = place(full)
-        if where is None:
-            spec = catalog.message(full)
-            identity = f'"{message_hash(spec, catalog)}", "{message_md5(spec, catalog)}"'
-            late.append(f'{name} = _type_of("{full}", {identity})')
-            continue
-        plain = class_name(full)
-        alias = "" if name == plain else f" as {name}"
-        imports.append(f"from {where} import {plain}{alias}")
-    head = [f"{MARKER}; do not edit.", f'"""The {origin}."""', ""]
-    head += ["from __future__ import annotations", "", *sorted(imports), ""]
-    head += ["__all__ = (", *(f'    "{name}",' for name in names), ")", *([""] * bool(late)), *late]
-    return re.sub(r"\n{4,}", "\n\n\n", "\n".join(head) + "\n" + body)
 
 
 def shipped_module(name: str) -> str:

@@ -6,5 +6,3 @@ line.
 """
 
 PUBLIC_MODULES = ("tf",)
-
-__all__ = ()

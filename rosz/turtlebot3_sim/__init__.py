@@ -2,5 +2,3 @@
 
 `world` is pure geometry; `simulator` is the node and the program.
 """
-
-__all__ = ()

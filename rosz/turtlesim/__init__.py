@@ -8,5 +8,3 @@ modules, because each is loaded alone.
 from rosz.turtlesim.snapshot import Snapshot, fetch
 
 PUBLIC_MODULES = ("teleop",)
-
-__all__ = ("Snapshot", "fetch")

@@ -7,5 +7,3 @@ Needs the extra ``rosz[web]``.
 """
 
 from rosz.web.opening import PORT, PageSettings, open_page
-
-__all__ = ("PORT", "PageSettings", "open_page")

@@ -21,6 +21,7 @@ from rosz.transforms import IDENTITY
 from rosz.transforms import Pose as Place
 from rosz.web.model import Frames, System
 from rosz.web.scene import Look, Meshes
+from rosz.web.scene.display import SceneSources
 from rosz.web.scene.drawing import Drawing
 from rosz.web.scene.markers import MarkerDisplay, draw_marker
 from rosz.web.scene.robot import RobotDisplay, draw_visual, read_visuals
@@ -233,7 +234,8 @@ def test_markers_come_and_go(network: Network, meshes: Meshes) -> None:
     graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/markers"), "the publisher")
     frames = Frames(page)
-    display = MarkerDisplay(page, graph.survey(), Look("/markers"), frames, meshes)
+    sources = SceneSources(page, graph.survey(), frames, meshes)
+    display = MarkerDisplay(sources, Look("/markers"))
     display.refresh("map")
     publisher.wait_for_subscribers(1)
 

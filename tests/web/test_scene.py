@@ -43,7 +43,7 @@ from rosz.web.scene import (
     open_display,
     read_setup,
 )
-from rosz.web.scene.display import TopicDisplay
+from rosz.web.scene.display import SceneSources, TopicDisplay
 from rosz.web.scene.drawing import Drawing
 from rosz.web.scene.maps import draw_map, read_cells
 from rosz.web.scene.poses import draw_path, draw_poses
@@ -262,7 +262,9 @@ def test_a_display_waits_for_the_transform_and_names_it(network: Network) -> Non
     graph = System(page, PagePolicy()).graph.use().value
     eventually(lambda: graph.survey().view.publishers("/scan"), "the publisher")
     frames = Frames(page)
-    display = TopicDisplay(page, graph.survey(), Look("/scan", "#ff0000"), frames)
+    meshes = Meshes(page.context.environment, lambda _: "")
+    sources = SceneSources(page, graph.survey(), frames, meshes)
+    display = TopicDisplay(sources, Look("/scan", "#ff0000"))
     scan = LaserScan(
         header=Header(stamp=Time.from_nsec(5_000_000_000), frame_id="laser"),
         range_max=5.0,

@@ -7,5 +7,3 @@ of the parameter store. It may import what a node may, and `rosz.params.replica`
 
 from rosz.bridges.fleet.fleet import Fleet
 from rosz.bridges.fleet.plan import FleetPlan, SharedNames, check_prefix, read_plan, read_share
-
-__all__ = ("Fleet", "FleetPlan", "SharedNames", "check_prefix", "read_plan", "read_share")

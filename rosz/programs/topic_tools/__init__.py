@@ -3,5 +3,3 @@
 `passing` has the input and the output that the programs of `relay` and `mux` are made of.
 `expression` makes new messages from parts of others.
 """
-
-__all__ = ()

@@ -30,7 +30,7 @@ class ActionsPage:
         self._rows: dict[str, ActionRow] = {}
         self._wanted = action
         self._chosen = ""
-        self._use: ActionUse | None = None
+        self._use: layout.Opened[ActionUse] = layout.Opened(frame)  # goals go on
         self._cards: dict[SentGoal, _GoalCard] = {}
         with frame.content:
             self._empty = layout.empty_state(
@@ -46,15 +46,8 @@ class ActionsPage:
                 with ui.column().classes("gap-4 min-w-0"):
                     self._add_form()
                     self._goals = ui.column().classes("w-full gap-3")
-        frame.keep(self)
         frame.every(_LIST_PERIOD, self._list)
         frame.every(_PERIOD, self._refresh)
-
-    def close(self) -> None:
-        """End the use of the action; goals go on."""
-        use, self._use = self._use, None
-        if use is not None:
-            use.close()
 
     def _add_table(self) -> ui.table:
         columns = [
@@ -76,11 +69,11 @@ class ActionsPage:
             )
             with ui.row().classes("w-full items-center gap-3"):
                 self._send_button = ui.button("Send goal", icon="send", on_click=self._send)
-                self._send_button.props("no-caps").disable()
+                self._send_button.disable()
                 self._cancel_button = ui.button(
                     "Cancel all", icon="cancel", on_click=lambda: self._cancel("")
                 )
-                self._cancel_button.props("no-caps outline").disable()
+                self._cancel_button.props("outline").disable()
                 with self._cancel_button:
                     ui.tooltip("Ends the goals of all clients")
 
@@ -105,7 +98,7 @@ class ActionsPage:
         self._empty.set_visibility(not rows and self._graph.complete)
 
     async def _choose(self, name: str) -> None:
-        self.close()
+        self._use.close()
         row = self._rows.get(name)
         self._chosen = name
         self._name.set_text(name)
@@ -121,7 +114,7 @@ class ActionsPage:
         if self._chosen != name or self._frame.closed:
             use.close()
             return
-        self._use = use
+        self._use.set(use)
         self._form.show(use.value.goal_type)
         for button in (self._send_button, self._cancel_button):
             button.enable()
@@ -149,7 +142,8 @@ class ActionsPage:
                     self._cards[goal] = _GoalCard(goal, self._cancel)
             self._cards[goal].refresh()
         own = {goal.id for goal in goals}
-        rows = self._use.value.rows() if self._use is not None else []
+        use = self._use.value
+        rows = [] if use is None else use.value.rows()
         self._others.show([row for row in rows if row.id not in own])
 
 
@@ -167,9 +161,8 @@ class _GoalCard:
                 self._state = ui.badge(goal.state, color="info").classes("text-sm")
                 self._time = ui.label("").classes("rosz-soft rosz-number text-sm")
                 ui.space()
-                self._cancel = ui.button("Cancel", on_click=lambda: cancel(goal.id)).props(
-                    "no-caps flat dense"
-                )
+                self._cancel = ui.button("Cancel", on_click=lambda: cancel(goal.id))
+                self._cancel.props("flat dense")
             ui.label(f"{time.strftime('%H:%M:%S', time.localtime(goal.began))}  {goal.id}").classes(
                 "rosz-mono rosz-soft break-all"
             )
@@ -238,6 +231,4 @@ class _OtherGoals:
             ui.badge(row.state, color=_COLORS.get(row.state, "info"))
             ui.label(row.id).classes("rosz-mono rosz-soft break-all grow")
             if row.running:
-                ui.button("Cancel", on_click=lambda: self._cancel(row.id)).props(
-                    "no-caps flat dense"
-                )
+                ui.button("Cancel", on_click=lambda: self._cancel(row.id)).props("flat dense")

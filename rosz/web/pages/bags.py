@@ -112,36 +112,28 @@ class _Recorder:
     def _add_form(self) -> None:
         self._topics = (
             ui.select([], multiple=True, value=[], label="Topics; none for all", with_input=True)
-            .props("dense options-dense use-chips clearable")
+            .props("use-chips clearable")
             .classes("w-full")
         )
         self._topics.on("popup-show", self._offer_topics)
         with ui.row().classes("w-full gap-3 items-end"):
-            self._name = (
-                ui.input("Name", placeholder="the time")
-                .props("dense aria-label=Name")
-                .classes("grow min-w-24")
-            )
+            self._name = ui.input("Name", placeholder="the time").props("aria-label=Name")
+            self._name.classes("grow min-w-24")
             self._format = ui.select(
                 _FORMATS, value=".mcap", label="Format", on_change=self._offer_compressions
-            ).props("dense options-dense")
-            self._compression = (
-                ui.select(list(COMPRESSIONS[".mcap"]), value="none", label="Compression")
-                .props("dense options-dense")
-                .classes("w-28")
             )
+            self._compression = ui.select(
+                list(COMPRESSIONS[".mcap"]), value="none", label="Compression"
+            ).classes("w-28")
         with (
             ui.expansion("More").props("dense header-class=rosz-group").classes("w-full"),
             ui.row().classes("w-full gap-3"),
         ):
-            self._exclude = ui.input("Leave out, as a regular expression").props("dense")
-            self._exclude.classes("w-full")
+            self._exclude = ui.input("Leave out, as a regular expression").classes("w-full")
             self._split_size = _number("Split after MB")
             self._split_seconds = _number("Split after seconds")
             self._most = _number("Keep the newest")
-        ui.button("Record", icon="fiber_manual_record", on_click=self._record).props(
-            "no-caps color=negative"
-        )
+        ui.button("Record", icon="fiber_manual_record", on_click=self._record, color="negative")
 
     def _add_going(self) -> None:
         with ui.row().classes("w-full items-center gap-3"):
@@ -149,9 +141,7 @@ class _Recorder:
             self._path = ui.label("").classes("font-medium break-all")
             ui.space()
             stop = self._bags.stop_recording
-            ui.button("Stop", icon="stop", on_click=lambda: self._frame.attempt(stop)).props(
-                "no-caps"
-            )
+            ui.button("Stop", icon="stop", on_click=lambda: self._frame.attempt(stop))
         with ui.row().classes("w-full gap-x-6 gap-y-1 rosz-number"):
             self._facts = {
                 name: _fact(name)
@@ -246,12 +236,12 @@ class _Transport:
                         value=1.0,
                         on_change=lambda event: self._change("rate", event.value),
                     )
-                    .props('dense options-dense aria-label="Rate"')
+                    .props('aria-label="Rate"')
                     .classes("w-20")
                 )
                 self._loop = ui.switch(
                     "Loop", on_change=lambda event: self._change("loop", float(event.value))
-                ).props("dense")
+                )
             self._said = ui.label("").classes("rosz-soft text-sm break-words w-full")
         self._fault = ui.label("").classes("rosz-card text-negative p-3 w-full break-words")
         self._fault.props("role=alert")
@@ -374,22 +364,19 @@ class _Contents:
         self._table.selected = list(rows)
         with ui.row().classes("w-full items-center gap-3"):
             self._prefix = ui.input("Prefix", placeholder="/old")
-            self._prefix.props("dense aria-label=Prefix").classes("w-28")
-            self._paused = ui.switch("Paused").props("dense")
-            self._loop = ui.switch("Loop").props("dense")
-            self._clock = ui.switch("/clock").props("dense")
+            self._prefix.props("aria-label=Prefix").classes("w-28")
+            self._paused, self._loop, self._clock = map(ui.switch, ("Paused", "Loop", "/clock"))
 
     def _add_buttons(self, name: str) -> None:
         with ui.row().classes("w-full items-center gap-3"):
             if not name.endswith(".active"):
-                ui.button("Play", icon="play_arrow", on_click=self._play).props("no-caps")
+                ui.button("Play", icon="play_arrow", on_click=self._play)
                 ui.button("Download", icon="download").props(
-                    f'no-caps outline download href="/bag/{quote(name)}"'
+                    f'outline download href="/bag/{quote(name)}"'
                 )
             ui.space()
-            ui.button("Delete", icon="delete", on_click=self._question).props(
-                "no-caps flat color=negative"
-            )
+            delete = ui.button("Delete", icon="delete", on_click=self._question, color="negative")
+            delete.props("flat")
 
     async def _play(self) -> None:
         chosen = [row["topic"] for row in self._table.selected]
@@ -438,7 +425,7 @@ def fault_of(run: BagRun | None) -> str:
 
 
 def _number(label: str) -> ui.number:
-    return ui.number(label, min=0).props("dense").classes("w-36")
+    return ui.number(label, min=0).classes("w-36")
 
 
 def _fact(name: str) -> ui.label:

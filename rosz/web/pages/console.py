@@ -107,7 +107,7 @@ class ConsolePage:
                 value=choice.level,
                 label="Lowest level",
                 on_change=lambda change: self._filter(level=change.value),
-            ).props("dense options-dense").classes("w-24")
+            ).classes("w-24")
             for field, label, props in (
                 ("node", "Node", "clearable"),
                 ("pattern", "Text", "clearable"),
@@ -121,7 +121,7 @@ class ConsolePage:
                         **{field: change.value or ""}
                     ),
                 )
-                self._inputs[field].props(f"dense debounce=300 {props}").classes("w-28")
+                self._inputs[field].props(f"debounce=300 {props}").classes("w-28")
             ui.space()
             self._pause = layout.tool_button("Pause", "pause", self._toggle)
             layout.tool_button("Clear", "delete_sweep", self._clear)
@@ -222,7 +222,7 @@ class ConsolePage:
             if not nodes:
                 ui.label("No node of rosz runs here; nodes of ROS 2 have their own tools.")
                 return
-            select = ui.select(nodes, label="Node", value=None).classes("w-full").props("dense")
+            select = ui.select(nodes, label="Node", value=None).classes("w-full")
             box = ui.column().classes("w-full gap-1")
 
         async def load() -> None:
@@ -238,7 +238,7 @@ class ConsolePage:
                         on_change=lambda change, logger=logger: self._set_level(
                             name, logger, change.value
                         ),
-                    ).classes("w-full").props("dense options-dense")
+                    ).classes("w-full")
 
         select.on_value_change(load)
 

@@ -37,11 +37,11 @@ class DrivePage:
         self._system = system
         frame = layout.Frame(system, "Drive", "/drive")
         self._graph = frame.use(system.graph)
-        self._driver: VelocityPublisher | None = None
+        self._driver: layout.Opened[VelocityPublisher] = layout.Opened(frame)
         self._held: set[str] = set()
         self._picture = system.pictures.add(self._take)
         self._number = 0
-        self._floor: FloorPlan | None = None
+        self._floor: layout.Opened[FloorPlan] = layout.Opened(frame)
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-4 px-3 py-2"):
                 self._select = layout.add_select(
@@ -53,7 +53,7 @@ class DrivePage:
                 )
                 self._select.classes("grow min-w-52")
                 self._speed, self._rate = (
-                    ui.number(unit, value=speed, min=0.01, step=0.1).props("dense").classes("w-20")
+                    ui.number(unit, value=speed, min=0.01, step=0.1).classes("w-20")
                     for unit, speed in (("m/s", 1.0), ("rad/s", 1.5))
                 )
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
@@ -91,20 +91,8 @@ class DrivePage:
             self._fault = ui.label("").classes("text-negative")
 
     def close(self) -> None:
-        """Stop driving."""
+        """Give no picture any more."""
         self._system.pictures.remove(self._picture)
-        self._close_floor()
-        self._close_driver()
-
-    def _close_driver(self) -> None:
-        driver, self._driver = self._driver, None
-        if driver is not None:
-            driver.close()
-
-    def _close_floor(self) -> None:
-        floor, self._floor = self._floor, None
-        if floor is not None:
-            floor.close()
 
     def _list(self) -> None:
         survey = self._graph.survey()
@@ -123,39 +111,41 @@ class DrivePage:
     def _open_floor(self, topics: dict[str, str]) -> None:
         """Show the robot from above if it says where it is."""
         if "odom" not in topics:
-            self._close_floor()
-        elif self._floor is None or self._floor.topics != topics:
-            self._close_floor()
-            self._floor = FloorPlan(self._system.node, self._system.permission, topics)
+            self._floor.close()
+        elif self._floor.value is None or self._floor.value.topics != topics:
+            self._floor.close()
+            self._floor.set(FloorPlan(self._system.node, self._system.permission, topics))
             self._floor_text.set_text(f"by {' and '.join(sorted(topics.values()))}")
-        self._floor_card.set_visibility(self._floor is not None)
+        self._floor_card.set_visibility(self._floor.value is not None)
 
     def _show_floor(self) -> None:
-        picture = "" if self._floor is None else self._floor.picture()
-        self._floor_picture.set_content(picture)
+        floor = self._floor.value
+        self._floor_picture.set_content("" if floor is None else floor.picture())
 
     def _choose(self) -> None:
         topic = str(self._select.value or "")
-        self._close_driver()
+        self._driver.close()
         if not topic:
             return
         layout.address_of(layout.query_of("/drive", topic=topic))
         try:
-            self._driver = VelocityPublisher(self._system.node, self._system.permission, topic)
+            driver = VelocityPublisher(self._system.node, self._system.permission, topic)
+            self._driver.set(driver)
             self._fault.set_text("")
         except RoszError as error:
             self._fault.set_text(str(error))
 
     def _live(self) -> None:
-        if self._driver is not None:
-            self._driver.alive()
+        if self._driver.value is not None:
+            self._driver.value.alive()
 
     def _go(self, forward: float, turn: float) -> None:
-        if self._driver is None:
+        driver = self._driver.value
+        if driver is None:
             return
         forward *= float(self._speed.value or 0)
         turn *= float(self._rate.value or 0)
-        self._driver.drive(forward, turn)
+        driver.drive(forward, turn)
         moving = forward or turn
         self._state.set_text(f"{forward:+.2f} m/s, {turn:+.2f} rad/s" if moving else "It stands.")
 

@@ -103,17 +103,16 @@ class MessageForm:
 
         editor: ValueElement[Any]
         if field.kind == "bool":
-            return ui.switch(value=bool(value), on_change=change).props("dense")
+            return ui.switch(value=bool(value), on_change=change)
         if field.kind == "choice":
             editor = ui.select(_options(field, value), value=value, on_change=change)
-            editor.props("options-dense")
         elif field.kind in ("integer", "number"):
             editor = ui.number(value=value, min=field.low, max=field.high, on_change=change)
             editor.props("step=any" if field.kind == "number" else "")
         else:
             editor = ui.input(value=str(value), on_change=change)
             editor.props("input-class=rosz-mono" if field.kind == "yaml" else "")
-        return editor.props("dense").classes("grow min-w-0")
+        return editor.classes("grow min-w-0")
 
     # From the fields to the text, and back.
 

@@ -132,7 +132,7 @@ class GraphPage:
                 value=options.content,
                 label="Show",
                 on_change=lambda change: self._choose(content=change.value),
-            ).props("dense options-dense").classes("w-40")
+            ).classes("w-40")
             for field, label in (("nodes", "Nodes"), ("topics", "Topics")):
                 ui.input(
                     label,
@@ -141,7 +141,7 @@ class GraphPage:
                     on_change=lambda change, field=field: self._choose(
                         **{field: change.value or ""}
                     ),
-                ).props("dense clearable debounce=400").classes("w-44")
+                ).props("clearable debounce=400").classes("w-44")
             self._add_options()
             ui.space()
             with ui.row().classes("items-center gap-1 flex-nowrap"):
@@ -162,7 +162,7 @@ class GraphPage:
     def _add_options(self) -> None:
         options = self._options
         with (
-            ui.button("Options", icon="tune").props("flat dense no-caps"),
+            ui.button("Options", icon="tune").props("flat dense"),
             ui.menu(),
             ui.column().classes("p-3 gap-1"),
         ):
@@ -171,7 +171,7 @@ class GraphPage:
                     label,
                     value=getattr(options, field),
                     on_change=lambda change, field=field: self._choose(**{field: change.value}),
-                ).props("dense")
+                )
             for name, label in _LABELS.items():
                 ui.switch(
                     label,
@@ -179,7 +179,7 @@ class GraphPage:
                     on_change=lambda change, name=name: self._choose_label(
                         name, shown=bool(change.value)
                     ),
-                ).props("dense")
+                )
             ui.number(
                 "Frames around namespaces",
                 value=options.group,
@@ -187,7 +187,7 @@ class GraphPage:
                 max=9,
                 precision=0,
                 on_change=lambda change: self._choose(group=int(change.value or 0)),
-            ).props("dense").classes("w-full")
+            ).classes("w-full")
 
     def _choose(self, **changes: object) -> None:
         self._options = msgspec.structs.replace(self._options, **changes)
@@ -305,7 +305,7 @@ class GraphPage:
             with ui.row().classes("w-full justify-end"):
                 if kind == "topic":
                     ui.link("Open the topic", layout.query_of("/topics", topic=name))
-                ui.button("Close", on_click=dialog.close).props("flat no-caps")
+                ui.button("Close", on_click=dialog.close).props("flat")
         dialog.on("hide", dialog.delete)
 
 

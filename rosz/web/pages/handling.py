@@ -60,7 +60,7 @@ class Handling:
             button = ui.button(
                 entry.title, on_click=lambda entry=entry: self._choose(display, drag, entry)
             )
-            button.props("flat dense no-caps align=left").classes("w-full")
+            button.props("flat dense align=left").classes("w-full")
             button.style(f"padding-left: {8 + 16 * depth}px")
             button.set_enabled(not has_more)
             if has_more:

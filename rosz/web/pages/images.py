@@ -33,7 +33,7 @@ class ImagesPage:
                         label="Topics of images",
                         on_change=self._choose,
                     )
-                    .props("dense options-dense use-chips")
+                    .props("use-chips")
                     .classes("grow min-w-52")
                 )
             self._empty = empty_state(

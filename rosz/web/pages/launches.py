@@ -117,10 +117,9 @@ async def confirm(title: str, text: str, button: str) -> bool:
         ui.label(title).classes("text-base font-semibold")
         ui.label(text)
         with ui.row().classes("w-full justify-end"):
-            ui.button("Cancel", on_click=lambda: dialog.submit(False)).props("flat no-caps")
-            ui.button(button.capitalize(), on_click=lambda: dialog.submit(True)).props(
-                "no-caps autofocus"
-            )
+            ui.button("Cancel", on_click=lambda: dialog.submit(False)).props("flat")
+            act = ui.button(button.capitalize(), on_click=lambda: dialog.submit(True))
+            act.props("autofocus")
     answer = bool(await dialog)
     dialog.delete()
     return answer
@@ -169,7 +168,7 @@ class OutputPage:
             ui.label(node).classes("font-semibold")
             self._state = ui.label("").classes("rosz-soft")
             ui.space()
-            self._pause = ui.switch("Pause").props("dense")
+            self._pause = ui.switch("Pause")
             layout.tool_button("Restart", "restart_alt", lambda: self._act("restart"))
             layout.tool_button("Stop", "stop", lambda: self._act("stop"))
         self._empty = ui.label("It has written nothing yet.").classes("rosz-soft")

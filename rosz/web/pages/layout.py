@@ -6,7 +6,7 @@ import json
 import logging
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 from urllib.parse import urlencode
 
 from nicegui import run, ui
@@ -56,6 +56,12 @@ ENTRIES = (
 """The pages, in the order of the navigation."""
 
 _STYLE = Path(__file__).with_name("style.css")
+
+# The look of the controls of all pages.
+ui.button.default_props("no-caps")
+ui.select.default_props("dense options-dense")
+for _control in (ui.input, ui.number, ui.switch):
+    _control.default_props("dense")
 
 
 class Frame:
@@ -225,6 +231,29 @@ class Frame:
         return result
 
 
+class Opened(Generic[T]):
+    """At most one thing that a page has open; another takes its place, and it ends with the page.
+
+    Attributes:
+        value: What is open; None for nothing.
+    """
+
+    def __init__(self, frame: Frame) -> None:
+        self.value: T | None = None
+        frame.keep(self)
+
+    def set(self, value: T) -> None:
+        """Close what is open, and keep another."""
+        self.close()
+        self.value = value
+
+    def close(self) -> None:
+        """Close what is open."""
+        value, self.value = self.value, None
+        if value is not None:
+            value.close()
+
+
 def empty_state(icon: str, title: str, text: str, command: str = "") -> ui.column:
     """Add a note that there is nothing, and what to start."""
     with ui.column().classes("rosz-card w-full items-center text-center p-8 gap-2") as column:
@@ -251,7 +280,7 @@ def card(title: str, classes: str = "p-4 gap-2") -> ui.column:
 
 def tool_button(text: str, icon: str, act: Callable[[], Any]) -> ui.button:
     """Add a flat button, as rows of tools have them."""
-    return ui.button(text, icon=icon, on_click=act).props("flat dense no-caps")
+    return ui.button(text, icon=icon, on_click=act).props("flat dense")
 
 
 def add_table(columns: list[dict[str, Any]], key: str = "name", most: int = 12) -> ui.table:
@@ -271,8 +300,7 @@ def add_select(
 ) -> ui.select:
     """Add a choice of names, which has only the chosen one yet; see `offer_options`."""
     names = [chosen] if chosen else []
-    select = ui.select(names, value=chosen or None, label=label, on_change=on_change, **options)
-    return select.props("dense options-dense")
+    return ui.select(names, value=chosen or None, label=label, on_change=on_change, **options)
 
 
 def offer_options(select: ui.select, names: Iterable[str]) -> list[str]:

@@ -142,13 +142,13 @@ class _Tables:
                 with ui.switch(
                     value=self._traffic.everything,
                     on_change=lambda change: setattr(self._traffic, "everything", change.value),
-                ).props('dense aria-label="Measure all topics"'):
+                ).props('aria-label="Measure all topics"'):
                     ui.tooltip(
                         "Measuring a topic means to receive it. Without this, images, clouds, maps"
                         " and topics of other machines are not measured."
                     )
                 ui.label("measure all").classes("rosz-soft text-sm -ml-2")
-                search = ui.input(placeholder="Filter").props("dense clearable").classes("w-40")
+                search = ui.input(placeholder="Filter").props("clearable").classes("w-40")
             columns = [
                 layout.column("name", "Topic"),
                 layout.column("type", "Type", "rosz-wide rosz-soft"),

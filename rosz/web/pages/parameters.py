@@ -69,7 +69,7 @@ class ParametersPage:
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
             self._search = (
                 ui.input("Filter", value=prefix, on_change=self._filter)
-                .props("dense clearable debounce=300")
+                .props("clearable debounce=300")
                 .classes("grow min-w-40")
             )
             layout.tool_button("New", "add", lambda: self._edit(""))
@@ -148,9 +148,9 @@ class ParametersPage:
 
         with ui.dialog(value=True).on("hide", leave) as dialog, ui.card().classes("rosz-card w-96"):
             ui.label(name or "New parameter").classes("text-base font-semibold break-all")
-            field = ui.input("Name", value="/") if not name else None
+            field = ui.input("Name", value="/").props(remove="dense") if not name else None
             if isinstance(value, bool):
-                switch = ui.switch("Value", value=value)
+                switch = ui.switch("Value", value=value).props(remove="dense")
                 text = ui.input(value=inline(value)).classes("hidden")
                 switch.on_value_change(
                     lambda change: text.set_value("true" if change.value else "false")
@@ -163,7 +163,7 @@ class ParametersPage:
                     .props("autogrow outlined input-class=rosz-mono")
                     .classes("w-full")
                 )
-            other = ui.switch("Allow another type").props("dense")
+            other = ui.switch("Allow another type")
             other.set_visibility(value is not None)
 
             async def store() -> None:
@@ -183,10 +183,10 @@ class ParametersPage:
 
             with ui.row().classes("w-full justify-end"):
                 if name:
-                    ui.button("Delete", color="negative", on_click=delete).props("flat no-caps")
+                    ui.button("Delete", color="negative", on_click=delete).props("flat")
                     ui.space()
-                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
-                ui.button("Set", on_click=store).props("no-caps")
+                ui.button("Cancel", on_click=dialog.close).props("flat")
+                ui.button("Set", on_click=store)
 
     def _store(self, name: str, text: str, *, other_type: bool) -> bool:
         self._parameters.set_text(name, text, other_type=other_type)

@@ -100,7 +100,6 @@ class PlotPage:
         with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
             self._input = (
                 ui.input("Field", placeholder="/turtle1/pose/x:y", autocomplete=[])
-                .props("dense")
                 .classes("grow min-w-52")
                 .on("keydown.enter", self._add)
             )
@@ -110,13 +109,13 @@ class PlotPage:
                 value=self._window,
                 label="Window",
                 on_change=lambda change: self._choose_window(change.value),
-            ).props("dense options-dense").classes("w-20")
+            ).classes("w-20")
             ui.select(
                 _TIMES,
                 value=self._times,
                 label="Time",
                 on_change=lambda change: self._choose_times(change.value),
-            ).props("dense options-dense").classes("w-32")
+            ).classes("w-32")
             self._pause = tool_button(
                 "Pause", "pause", lambda: self._set_paused(paused=not self._paused)
             )

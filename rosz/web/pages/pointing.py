@@ -48,10 +48,10 @@ class Pointing:
             self._hint = ui.label("").classes("rosz-soft text-sm")
             ui.space()
             self._numbers = [
-                ui.number(name, value=0, step=0.1).props("dense").classes("w-16")
+                ui.number(name, value=0, step=0.1).classes("w-16")
                 for name in ("x (m)", "y (m)", "yaw (°)")
             ]
-            ui.button("Send", on_click=self._send_numbers).props("flat dense no-caps")
+            ui.button("Send", on_click=self._send_numbers).props("flat dense")
         self._row.set_visibility(False)
         ui.on("rosz-placed", self._placed)
         ui.keyboard(lambda event: event.key.escape and self._choice.set_value(_MOVE))

@@ -26,7 +26,7 @@ class ReconfigurePage:
         self._system = system
         self._frame = frame = layout.Frame(system, "Reconfigure", "/reconfigure")
         self._graph = frame.use(system.graph)
-        self._open: Reconfiguration | None = None
+        self._open: layout.Opened[Reconfiguration] = layout.Opened(frame)
         self._shown: Description | None = None
         self._seen = 0
         self._widgets: dict[str, list[ValueElement[Any]]] = {}
@@ -46,17 +46,10 @@ class ReconfigurePage:
                 "rosz run rosz_tutorials wave.py",
             )
             self._box = ui.column().classes("w-full gap-4")
-        frame.keep(self)
         frame.every(_LIST_PERIOD, self._list)
         if server:
             self._choose(server)
         ui.timer(_PERIOD, self._refresh)
-
-    def close(self) -> None:
-        """Follow the settings no longer."""
-        opened, self._open = self._open, None
-        if opened is not None:
-            opened.close()
 
     def _list(self) -> None:
         servers = find_servers(self._graph.survey().view)
@@ -66,21 +59,21 @@ class ReconfigurePage:
         self._empty.set_visibility(not options and self._graph.complete)
 
     def _choose(self, name: str | None) -> None:
-        if self._open is not None and self._open.name == name:
+        if self._open.value is not None and self._open.value.name == name:
             return
-        self.close()
+        self._open.close()
         self._box.clear()
         self._shown, self._seen = None, 0
         self._pending.clear()
         if name:
             layout.address_of(layout.query_of("/reconfigure", server=name))
             try:
-                self._open = Reconfiguration(self._system.node, self._system.permission, name)
+                self._open.set(Reconfiguration(self._system.node, self._system.permission, name))
             except RoszError as error:
                 self._frame.show_fault(str(error))
 
     async def _refresh(self) -> None:
-        opened = self._open
+        opened = self._open.value
         state = None if opened is None else opened.state()
         if opened is None or state is None:
             return
@@ -136,12 +129,12 @@ class ReconfigurePage:
             options = {choice.value: choice.name for choice in setting.choices}
             options.setdefault(value, str(value))
             select = ui.select(options, value=value, on_change=change).classes("grow min-w-40")
-            return [select.props(f"dense options-dense {label}")]
+            return [select.props(label)]
         if setting.kind == "bool":
-            return [ui.switch(value=bool(value), on_change=change).props(label)]
+            return [ui.switch(value=bool(value), on_change=change).props(label, remove="dense")]
         if setting.kind == "str":
             text = ui.input(value=str(value), on_change=change).classes("grow min-w-40")
-            return [text.props(f"dense debounce=400 {label}")]
+            return [text.props(f"debounce=400 {label}")]
         whole = setting.kind == "int"
         editors: list[ValueElement[Any]] = []
         low, high = float(setting.min or 0), float(setting.max or 0)
@@ -160,7 +153,7 @@ class ReconfigurePage:
             max=high if bounded else None,
             on_change=change,
         )
-        editors.append(number.props(f"dense debounce=400 {label}").classes("w-28"))
+        editors.append(number.props(f"debounce=400 {label}").classes("w-28"))
         return editors
 
     def _change(self, setting: Setting, value: Any) -> None:

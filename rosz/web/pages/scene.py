@@ -148,11 +148,8 @@ class ScenePage:
             )
             self._pointing.add_choice()
             ui.space()
-            self._add = (
-                ui.select({}, label="Add a display", on_change=self._add_chosen)
-                .props("dense options-dense")
-                .classes("w-60")
-            )
+            self._add = ui.select({}, label="Add a display", on_change=self._add_chosen)
+            self._add.classes("w-60")
 
     def close(self) -> None:
         """Close all displays."""
@@ -301,7 +298,7 @@ class _ShownDisplay:
                     value=self.look.color if self.look.color in choices else "",
                     label="Colors",
                     on_change=lambda e: self._set(color=str(e.value or "")),
-                ).props("dense options-dense").classes("grow min-w-0")
+                ).classes("grow min-w-0")
             if kind not in _OWN_COLORS:
                 shown = self.look.color if self.look.color.startswith("#") else ""
                 ui.color_input(
@@ -314,7 +311,7 @@ class _ShownDisplay:
                     label,
                     value=getattr(self.look, field),
                     on_change=lambda e: self._set(**{field: str(e.value or "").strip("/")}),
-                ).props("dense debounce=400").classes("grow min-w-0")
+                ).props("debounce=400").classes("grow min-w-0")
 
     def _add_numbers(self, kind: str) -> None:
         if kind not in _OWN_SIZES:
@@ -324,7 +321,7 @@ class _ShownDisplay:
                 min=0,
                 step=0.1,
                 on_change=lambda e: self._set(size=float(e.value or 0)),
-            ).props("dense").classes("w-20")
+            ).classes("w-20")
         if kind in _NUMBERS:
             key, title, form = _NUMBERS[kind]
             ui.number(
@@ -333,7 +330,7 @@ class _ShownDisplay:
                 min=0,
                 precision=0 if form is int else None,
                 on_change=lambda e: self._set(**{key: form(e.value or 0)}),
-            ).props("dense").classes("w-20")
+            ).classes("w-20")
 
     def _set(self, **changes: Any) -> None:
         self.look = msgspec.structs.replace(self.look, **changes)

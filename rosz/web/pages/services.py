@@ -35,13 +35,9 @@ class ServicesPage:
                     with ui.row().classes("w-full items-center"):
                         ui.label("Services").classes("text-base font-semibold")
                         ui.space()
-                        search = (
-                            ui.input(placeholder="Filter").props("dense clearable").classes("w-40")
-                        )
+                        search = ui.input(placeholder="Filter").props("clearable").classes("w-40")
                     self._table = self._add_table(search)
-                    self._all = ui.switch("Services of loggers too", on_change=self._refresh).props(
-                        "dense"
-                    )
+                    self._all = ui.switch("Services of loggers too", on_change=self._refresh)
                 self._add_form()
         frame.every(_PERIOD, self._refresh)
 
@@ -63,7 +59,7 @@ class ServicesPage:
             self._form = MessageForm(
                 self._system.node, "Request in YAML; fields left out have their default value"
             )
-            self._button = ui.button("Call", icon="send", on_click=self._call).props("no-caps")
+            self._button = ui.button("Call", icon="send", on_click=self._call)
             self._button.disable()
             self._answer = ui.label("").classes("rosz-mono whitespace-pre-wrap break-all w-full")
 

@@ -37,7 +37,7 @@ class TopicsPage:
         self._graph = frame.use(system.graph)
         self._field = field
         self._condition = condition
-        self._watch: TopicWatch | None = None
+        self._watch: layout.Opened[TopicWatch] = layout.Opened(frame)
         self._fault = ""
         with frame.content:
             with ui.row().classes("rosz-card w-full items-center gap-3 px-3 py-2"):
@@ -54,26 +54,19 @@ class TopicsPage:
                     value=field,
                     placeholder="pose/position",
                     on_change=lambda change: self._choose_field(change.value or ""),
-                ).props("dense clearable debounce=400").classes("w-40")
+                ).props("clearable debounce=400").classes("w-40")
                 ui.input(
                     "Only if",
                     value=condition,
                     placeholder="linear/x > 0.5",
                     on_change=lambda change: self._choose_condition(change.value or ""),
-                ).props("dense clearable debounce=600").classes("w-40")
-                self._frozen = ui.switch("Freeze").props("dense")
+                ).props("clearable debounce=600").classes("w-40")
+                self._frozen = ui.switch("Freeze")
             with ui.element("div").classes("w-full grid gap-4 grid-cols-1 lg:grid-cols-2"):
                 self._echo = _Echo()
                 self._publish = _Publish(system, frame)
-        frame.keep(self)
         frame.every(_LIST_PERIOD, self._list)
         frame.every(_PERIOD, self._refresh)
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        watch, self._watch = self._watch, None
-        if watch is not None:
-            watch.close()
 
     def _list(self) -> None:
         own = self._system.node.name
@@ -82,11 +75,11 @@ class TopicsPage:
         rows = [entry.name for entry in list_topics(tokens)]
         chosen = self._select.value
         layout.offer_options(self._select, rows)
-        if self._watch is None and chosen and chosen in rows:
+        if self._watch.value is None and chosen and chosen in rows:
             self._open(chosen)
 
     def _choose(self, topic: str | None) -> None:
-        self.close()
+        self._watch.close()
         self._echo.clear()
         self._show_address()
         if topic:
@@ -114,15 +107,16 @@ class TopicsPage:
             survey = self._graph.survey()
             find_topic(survey, topic)
             condition = FieldCondition(self._condition) if self._condition.strip() else None
-            self._watch = TopicWatch(self._system.node, survey, topic, condition)
+            watch = TopicWatch(self._system.node, survey, topic, condition)
         except RoszError as error:
             self._fault = str(error) if self._graph.complete else ""
             return
+        self._watch.set(watch)
         self._fault = ""
-        self._publish.offer(topic, short_type(self._watch.type_name))
+        self._publish.offer(topic, short_type(watch.type_name))
 
     def _refresh(self) -> None:
-        watch = self._watch
+        watch = self._watch.value
         if watch is None:
             self._echo.show_nothing(self._select.value, self._fault)
             return
@@ -220,26 +214,20 @@ class _Publish:
     def __init__(self, system: System, frame: layout.Frame) -> None:
         self._system = system
         self._frame = frame
-        self._sending: Sending | None = None
-        frame.keep(self)
+        self._sending: layout.Opened[Sending] = layout.Opened(frame)
         with layout.card("Publish"):
             with ui.row().classes("w-full gap-3"):
-                self._topic = ui.input("Topic").props("dense").classes("grow")
-                self._type = (
-                    ui.input("Type", placeholder="std_msgs/String").props("dense").classes("grow")
-                )
+                self._topic = ui.input("Topic").classes("grow")
+                self._type = ui.input("Type", placeholder="std_msgs/String").classes("grow")
             self._form = MessageForm(
                 system.node, "Fields in YAML; those left out have their default value"
             )
             with ui.row().classes("w-full items-center gap-3"):
-                ui.button("Fill in", on_click=self._fill).props("flat no-caps")
-                ui.button("Publish once", icon="send", on_click=self._send).props("no-caps")
-                self._rate = (
-                    ui.number("Hz", value=10, min=0.01, max=_FASTEST).props("dense").classes("w-16")
-                )
-                self._repeat = ui.button("Repeat", icon="repeat", on_click=self._toggle).props(
-                    "outline no-caps"
-                )
+                ui.button("Fill in", on_click=self._fill).props("flat")
+                ui.button("Publish once", icon="send", on_click=self._send)
+                self._rate = ui.number("Hz", value=10, min=0.01, max=_FASTEST).classes("w-16")
+                self._repeat = ui.button("Repeat", icon="repeat", on_click=self._toggle)
+                self._repeat.props("outline")
                 self._sent = ui.label("").classes("rosz-soft text-sm")
         ui.timer(0.5, self._count)
 
@@ -247,7 +235,7 @@ class _Publish:
         """Fill in a topic and its type, unless the form is of that topic already."""
         if (self._topic.value, self._type.value) == (topic, type_name):
             return
-        self.close()
+        self._sending.close()
         self._topic.set_value(topic)
         self._type.set_value(type_name)
         self._fill()
@@ -261,31 +249,28 @@ class _Publish:
     def _open(self) -> Sending:
         topic, type_name = self._topic.value.strip(), self._type.value.strip()
         name = self._system.node.resolve(topic)
-        if self._sending is None or self._sending.named != (name, type_name):
-            self.close()
-            self._sending = Sending(self._system.node, self._system.permission, topic, type_name)
-        return self._sending
+        sending = self._sending.value
+        if sending is None or sending.named != (name, type_name):
+            self._sending.close()
+            sending = Sending(self._system.node, self._system.permission, topic, type_name)
+            self._sending.set(sending)
+        return sending
 
     async def _send(self) -> None:
         text = self._form.text
         await self._frame.attempt(lambda: self._open().send(text), f"published {self._topic.value}")
 
     async def _toggle(self) -> None:
-        if self._sending is not None and self._sending.repeats:
-            self._sending.stop()
+        sending = self._sending.value
+        if sending is not None and sending.repeats:
+            sending.stop()
         else:
             text, rate = self._form.text, min(_FASTEST, max(0.01, float(self._rate.value or 1)))
             await self._frame.attempt(lambda: self._open().repeat(text, rate))
         self._count()
 
     def _count(self) -> None:
-        sending = self._sending
+        sending = self._sending.value
         repeats = sending is not None and sending.repeats
         self._repeat.set_text("Stop" if repeats else "Repeat")
         self._sent.set_text(f"{sending.sent} sent" if sending is not None and sending.sent else "")
-
-    def close(self) -> None:
-        """Publish no more."""
-        sending, self._sending = self._sending, None
-        if sending is not None:
-            sending.close()

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from rosz.errors import RoszError, UsageError
-from rosz.introspect import Survey, find_token, topic_types
+from rosz.introspect import find_token, topic_types
 from rosz.lifecycle import Closable
-from rosz.node import Node
 from rosz.transforms import Pose
-from rosz.web.model import Frames, TopicWatch
-from rosz.web.scene.display import TopicDisplay
+from rosz.web.model import TopicWatch
+from rosz.web.scene.display import SceneSources, TopicDisplay
 from rosz.web.scene.drawing import Array, Drawing, moved
 from rosz.web.scene.sensors import MOST_POINTS, draw_points
 from rosz.web.scene.setup import DEPTH, Look
@@ -33,14 +32,15 @@ class DepthDisplay(TopicDisplay):
     The name of the display is ``depth:`` and the topic.
     """
 
-    def __init__(self, node: Node, survey: Survey, look: Look, frames: Frames) -> None:
+    def __init__(self, sources: SceneSources, look: Look) -> None:
+        node, survey = sources.node, sources.survey
         topic = look.name.removeprefix(DEPTH + ":")
         self._info_topic = info_of(topic)
         for topic_name in filter(None, (self._info_topic, look.image)):
             find_token(survey.view, topic_name, topic_types(survey.view).get(topic_name, ("",))[0])
         self._open: Callable[[str], TopicWatch] = lambda name: TopicWatch(node, survey, name)
         self._watches: list[TopicWatch] = []
-        super().__init__(node, survey, look, frames, topic, self._draw_depth)
+        super().__init__(sources, look, topic, self._draw_depth)
         self.kind = "DepthCloud"
 
     def _subscribe(self) -> Sequence[Closable]:

@@ -20,6 +20,7 @@ from rosz.transforms import IDENTITY, Pose
 from rosz.web.model import Frames, ImageWatch, read_frame
 from rosz.web.scene import poses, sensors
 from rosz.web.scene.drawing import MEDIA, Drawing, color_bytes
+from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.setup import Look
 from rosz.web.scene.shapes import draw_axes
 
@@ -53,6 +54,15 @@ _DRAW: dict[str, _Draw] = {
     "sensor_msgs/Range": sensors.draw_range,
 }
 DRAWN_TYPES = frozenset(_DRAW)
+
+
+class SceneSources(NamedTuple):
+    """What displays draw: the messages that a node receives, by frames, and meshes."""
+
+    node: Node
+    survey: Survey
+    frames: Frames
+    meshes: Meshes
 
 
 class Display:
@@ -186,7 +196,8 @@ class ImageDisplay(Display):
         UsageError: A library is not installed.
     """
 
-    def __init__(self, node: Node, survey: Survey, look: Look) -> None:
+    def __init__(self, sources: SceneSources, look: Look) -> None:
+        node, survey = sources.node, sources.survey
         self._open: Callable[[], ImageWatch] = lambda: ImageWatch(node, survey, look.name)
         watch = self._open()
         super().__init__(look, short_type(watch.type_name))
@@ -234,10 +245,8 @@ class ReceivingDisplay(Display):
     """A display of the messages of one topic.
 
     Args:
-        node: The node that subscribes to it.
-        survey: The running nodes.
+        sources: The node that subscribes to it, and what it draws with.
         look: Its settings.
-        frames: The frames.
         topic: Full name of the topic; that of the display by default.
 
     Raises:
@@ -246,15 +255,12 @@ class ReceivingDisplay(Display):
         DefinitionError: Its definition differs from the one here.
     """
 
-    def __init__(
-        self, node: Node, survey: Survey, look: Look, frames: Frames, topic: str = ""
-    ) -> None:
+    def __init__(self, sources: SceneSources, look: Look, topic: str = "") -> None:
+        self._node, survey, self._frames, self._meshes = sources
         self._topic = topic = topic or look.name
         token = find_token(survey.view, topic, topic_types(survey.view).get(topic, ("",))[0])
         super().__init__(look, short_type(token.type_name))
-        self._node = node
-        self._cls: Any = find_class(node, token)
-        self._frames = frames
+        self._cls: Any = find_class(self._node, token)
 
     def _find(
         self, fixed: str, header: Any, faults: Counter[str], *, latest: bool = False
@@ -289,20 +295,14 @@ class TopicDisplay(ReceivingDisplay):
     """
 
     def __init__(
-        self,
-        node: Node,
-        survey: Survey,
-        look: Look,
-        frames: Frames,
-        topic: str = "",
-        draw: _Draw | None = None,
+        self, sources: SceneSources, look: Look, topic: str = "", draw: _Draw | None = None
     ) -> None:
-        super().__init__(node, survey, look, frames, topic)
+        super().__init__(sources, look, topic)
         self.received: int = 0
         self._draw = draw or _DRAW[self.kind]
         self._trail = poses.Trail() if self.kind == "nav_msgs/Odometry" else None
         self._stamped: bool = self._cls._has_header
-        self._decode = node.context.decoder(self._cls)
+        self._decode = self._node.context.decoder(self._cls)
         self._kept: BoundedQueue[_Kept] = BoundedQueue(_QUEUE, _MOST_BYTES)
         self._chosen: tuple[_Kept, Pose] | None = None
         self._wanted: object = None

@@ -10,20 +10,16 @@ import msgspec
 import numpy as np
 
 from rosz.errors import RoszError
-from rosz.introspect import Survey
 from rosz.lifecycle import Closable
 from rosz.msgs.builtin_interfaces.msg import Time
 from rosz.msgs.geometry_msgs.msg import Point, Quaternion, Vector3
 from rosz.msgs.geometry_msgs.msg import Pose as PoseMessage
 from rosz.msgs.std_msgs.msg import ColorRGBA, Header
 from rosz.msgs.visualization_msgs import msg
-from rosz.node import Node
 from rosz.transforms import Pose, compose, invert
-from rosz.web.model import Frames
-from rosz.web.scene.display import ReceivingDisplay
+from rosz.web.scene.display import ReceivingDisplay, SceneSources
 from rosz.web.scene.drawing import Drawing, matrix_of
 from rosz.web.scene.markers import draw_marker
-from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.poses import pose_from, rotation_from
 from rosz.web.scene.setup import Look
 
@@ -83,18 +79,9 @@ class HandleDisplay(ReceivingDisplay):
     The node also reports the user's actions, unless there is an objection, which is shown.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        survey: Survey,
-        look: Look,
-        frames: Frames,
-        meshes: Meshes,
-        objection: str = "",
-    ) -> None:
-        super().__init__(node, survey, look, frames)
+    def __init__(self, sources: SceneSources, look: Look, objection: str = "") -> None:
+        super().__init__(sources, look)
         self._space = look.name.removesuffix(_UPDATE)
-        self._meshes = meshes
         self._objection = objection
         self._handles: dict[str, _Handle] = {}
         self._held = ""
@@ -102,7 +89,9 @@ class HandleDisplay(ReceivingDisplay):
         self._refused = ""
         self._publisher: Any = None
         if not objection:
-            self._publisher = node.publisher(self._space + FEEDBACK, _Feedback, queue_size=_QUEUE)
+            self._publisher = self._node.publisher(
+                self._space + FEEDBACK, _Feedback, queue_size=_QUEUE
+            )
 
     # Receiving messages.
 

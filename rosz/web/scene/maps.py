@@ -8,13 +8,10 @@ from typing import Any
 import numpy as np
 
 from rosz.errors import UsageError
-from rosz.introspect import Survey
 from rosz.lifecycle import Closable
 from rosz.msgs.map_msgs.msg import OccupancyGridUpdate
-from rosz.node import Node
 from rosz.transforms import Pose, compose
-from rosz.web.model import Frames
-from rosz.web.scene.display import ReceivingDisplay
+from rosz.web.scene.display import ReceivingDisplay, SceneSources
 from rosz.web.scene.drawing import Array, Drawing, placed
 from rosz.web.scene.poses import pose_from
 from rosz.web.scene.setup import Look
@@ -33,10 +30,8 @@ class MapDisplay(ReceivingDisplay):
     reason why the page may not receive updates; empty if it may.
     """
 
-    def __init__(
-        self, node: Node, survey: Survey, look: Look, frames: Frames, unseen: str = ""
-    ) -> None:
-        super().__init__(node, survey, look, frames)
+    def __init__(self, sources: SceneSources, look: Look, unseen: str = "") -> None:
+        super().__init__(sources, look)
         self._unseen = unseen
         self._map: Any = None
         self._rows: Array = np.zeros((0, 0), np.uint8)

@@ -11,13 +11,10 @@ from typing import Any
 import numpy as np
 
 from rosz.errors import RoszError
-from rosz.introspect import Survey
 from rosz.lifecycle import Closable
 from rosz.msgs.visualization_msgs.msg import Marker
-from rosz.node import Node
 from rosz.transforms import Pose, compose
-from rosz.web.model import Frames
-from rosz.web.scene.display import ReceivingDisplay
+from rosz.web.scene.display import ReceivingDisplay, SceneSources
 from rosz.web.scene.drawing import Array, Drawing, Shape, css_of, moved, placed
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.poses import pose_from
@@ -46,11 +43,8 @@ class _Placed:
 class MarkerDisplay(ReceivingDisplay):
     """The markers of a topic of Marker or MarkerArray messages, with the meshes that they name."""
 
-    def __init__(
-        self, node: Node, survey: Survey, look: Look, frames: Frames, meshes: Meshes
-    ) -> None:
-        super().__init__(node, survey, look, frames)
-        self._meshes = meshes
+    def __init__(self, sources: SceneSources, look: Look) -> None:
+        super().__init__(sources, look)
         self._placed: dict[tuple[str, int], _Placed] = {}
         self._refused = ""
 

@@ -52,6 +52,7 @@ def open_display(
         RoszError: It cannot be opened, or not yet.
     """
     name, node = look.name, system.node
+    sources = display.SceneSources(node, survey, frames, meshes)
     if name in STILL:
         return StillDisplay(look, frames)
     if name == TF:
@@ -63,29 +64,27 @@ def open_display(
         topic = name.partition(":")[2]
         for topic_name in filter(None, (topic, info_of(topic), look.image)):
             system.permission.check("subscribe", topic_name)
-        return DepthDisplay(node, survey, look, frames)
-    return _open_topic(system, survey, frames, meshes, look)
+        return DepthDisplay(sources, look)
+    return _open_topic(system, sources, look)
 
 
-def _open_topic(
-    system: System, survey: Survey, frames: Frames, meshes: Meshes, look: Look
-) -> display.Display:
-    name, node = look.name, system.node
+def _open_topic(system: System, sources: display.SceneSources, look: Look) -> display.Display:
+    name = look.name
     system.permission.check("subscribe", name)
-    types = [short_type(type_name) for type_name in topic_types(survey.view).get(name, ())]
+    types = [short_type(type_name) for type_name in topic_types(sources.survey.view).get(name, ())]
     if not types:
         raise NotFoundError(f"topic '{name}' does not exist yet")
     if types[0] in MARKER_TYPES:
-        return MarkerDisplay(node, survey, look, frames, meshes)
+        return MarkerDisplay(sources, look)
     if types[0] == HANDLE_TYPE:
         feedback = f"{name.rpartition('/')[0]}/{FEEDBACK}"
         objection = system.permission.objection("publish", feedback)
-        return HandleDisplay(node, survey, look, frames, meshes, objection)
+        return HandleDisplay(sources, look, objection)
     if types[0] == MAP_TYPE:
         unseen = system.permission.objection("subscribe", name + UPDATES)
-        return MapDisplay(node, survey, look, frames, unseen)
+        return MapDisplay(sources, look, unseen)
     if types[0] in IMAGE_TYPES:
-        return display.ImageDisplay(node, survey, look)
+        return display.ImageDisplay(sources, look)
     if types[0] not in display.DRAWN_TYPES:
         raise UsageError(f"topic '{name}' is of type {types[0]}, which is not drawn")
-    return display.TopicDisplay(node, survey, look, frames)
+    return display.TopicDisplay(sources, look)
