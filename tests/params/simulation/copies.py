@@ -35,6 +35,11 @@ _IGNORED: Final = frozenset(
 
 
 _NUMBERED: Final = frozenset({"queries", "_queries"})
+_FIXED: Final = frozenset({int, float, bool, str, bytes, tuple, frozenset, type(None), Write})
+"""Types of what never changes, unless a tuple holds what does; such tuples are not used."""
+
+_PLAIN: Final = frozenset({int, float, bool, str, bytes, type(None)})
+"""Types of what has itself as its form."""
 
 
 def clone(thing: Any, memo: dict[int, Any]) -> Any:
@@ -47,12 +52,18 @@ def clone(thing: Any, memo: dict[int, Any]) -> Any:
     return thing if cloner is None else cloner(thing, memo)
 
 
+def _clone_values(values: dict[Any, Any], memo: dict[int, Any]) -> dict[Any, Any]:
+    made = values.copy()
+    for key, value in values.items():
+        if type(value) not in _FIXED:
+            made[key] = clone(value, memo)
+    return made
+
+
 def _clone_dict(thing: dict[Any, Any], memo: dict[int, Any]) -> Any:
     made = memo.get(id(thing))
     if made is None:
-        made = memo[id(thing)] = {}
-        for key, value in thing.items():
-            made[key] = clone(value, memo)
+        made = memo[id(thing)] = _clone_values(thing, memo)
     return made
 
 
@@ -100,13 +111,11 @@ def _clone_object(thing: Any, memo: dict[int, Any]) -> Any:
     if made is None:
         made = memo[id(thing)] = object.__new__(type(thing))
         target = made.__dict__
+        target.update(thing.__dict__)
         for name, value in thing.__dict__.items():
-            if name in _SHARED:
-                target[name] = value
-            elif name in _FLAT:
-                target[name] = value.copy()
-            else:
-                target[name] = clone(value, memo)
+            if type(value) in _FIXED or name in _SHARED:
+                continue
+            target[name] = value.copy() if name in _FLAT else clone(value, memo)
     return made
 
 
@@ -154,13 +163,22 @@ class Form:
         return form(thing)
 
     def _of_list(self, things: Any) -> Any:
-        return tuple([self.of(thing) for thing in things])
+        return tuple([thing if type(thing) in _PLAIN else self.of(thing) for thing in things])
 
     def _of_set(self, things: Any) -> Any:
-        return frozenset([self.of(thing) for thing in things])
+        return frozenset([thing if type(thing) in _PLAIN else self.of(thing) for thing in things])
 
     def _of_dict(self, things: Any) -> Any:
-        return frozenset([(self.of(key), self.of(value)) for key, value in things.items()])
+        of = self.of
+        return frozenset(
+            [
+                (
+                    key if type(key) in _PLAIN else of(key),
+                    value if type(value) in _PLAIN else of(value),
+                )
+                for key, value in things.items()
+            ]
+        )
 
     def _of_struct(self, thing: Any) -> Any:
         names = thing.__struct_fields__
@@ -173,14 +191,18 @@ class Form:
         if id(thing) in self._met:
             return self._met[id(thing)]
         self._met[id(thing)] = len(self._met)
-        return tuple(
-            [
+        form: list[Any] = []
+        for name, value in thing.__dict__.items():
+            if name in _IGNORED:
+                continue
+            if type(value) in _PLAIN:
+                form.append(value)
+            elif name in _NUMBERED:
                 # Queries are alike whatever their numbers; those on their way have others.
-                self.of([value[key] for key in sorted(value)] if name in _NUMBERED else value)
-                for name, value in thing.__dict__.items()
-                if name not in _IGNORED
-            ]
-        )
+                form.append(self.of([value[key] for key in sorted(value)]))
+            else:
+                form.append(self.of(value))
+        return tuple(form)
 
     def _form_of(self, kind: Any) -> Callable[[Any], Any]:
         if issubclass(kind, msgspec.Struct):

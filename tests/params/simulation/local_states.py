@@ -8,7 +8,7 @@ others that show that looking at them is in vain.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -63,6 +63,7 @@ class LocalStates:
         self._numbers = Numbers()
         self._zids, self._faces, self._judged = Numbers(""), Numbers(None), Numbers(None)
         self._bundles = Numbers(())
+        self._of_process: dict[int, dict[str, Any]] = {}
         lives = 2 + script.crashes + len(script.steps)
         self.facts = Facts(
             process=(np.int32, 0),
@@ -117,26 +118,33 @@ class LocalStates:
         if not local.process:
             self.facts.add(process=0, face=0, due=np.inf, asks=asks)
             return
-        process = exploration.stage.states[local.process]
-        due = next_due(process, urgent=True)
-        closes = process.joined and not serves(process)
         self.facts.add(
-            process=local.process,
-            zid=self._zids.of(process.zid),
-            face=self._faces.of(
-                Face(process.zid, process.token, process.seed, process.member.start)
-            ),
-            serves=serves(process),
-            due=due[0] if due else np.inf,
+            **self._facts_of(local.process),
             waits=bool(items),
             own=any(item.is_own for item in items),
             loses=any(item.can_be_lost for item in items),
             looks=any(item.kind == "look" for item in items),
             asks=asks,
-            judged=self._judged.of(
-                (process.zid, closes, Form().of((process.core.history, process.disk)))
-            ),
         )
+
+    def _facts_of(self, number: int) -> dict[str, Any]:
+        """Return the facts that follow from the process alone."""
+        facts = self._of_process.get(number)
+        if facts is None:
+            process = self._exploration.stage.states[number]
+            due = next_due(process, urgent=True)
+            closes = process.joined and not serves(process)
+            form = Form().of((process.core.history, process.disk))
+            face = Face(process.zid, process.token, process.seed, process.member.start)
+            facts = self._of_process[number] = {
+                "process": number,
+                "zid": self._zids.of(process.zid),
+                "face": self._faces.of(face),
+                "serves": serves(process),
+                "due": due[0] if due else np.inf,
+                "judged": self._judged.of((process.zid, closes, form)),
+            }
+        return facts
 
     def asked_by(self, zids: Array, locals_: Array) -> Array:
         """Return the numbers of the queries of a session that are on their way, as bits."""

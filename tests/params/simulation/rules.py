@@ -244,9 +244,7 @@ class Rules:
             code=kind << 32 | what,
         )
 
-    def _result(
-        self, state: State, row: list[int], kind: int, machine: int, what: int
-    ) -> _Result:
+    def _result(self, state: State, row: list[int], kind: int, machine: int, what: int) -> _Result:
         """Return what a move does, whatever else is on its way."""
         faces = self._locals.facts["face"][row].tolist()
         taken: list[Any] = []

@@ -45,8 +45,8 @@ class Result(msgspec.Struct):
         end = "all" if self.finished else "not all"
         return (
             f"{self.states} states ({end}), {self.moves} moves, {self.ends} ends,"
-            f" {self.processes} states of processes, {self.locals} local states, {self.steps} steps,"
-            f" {self.seconds:.1f} s\n{self.finding}"
+            f" {self.processes} states of processes, {self.locals} local states,"
+            f" {self.steps} steps, {self.seconds:.1f} s\n{self.finding}"
         ).rstrip()
 
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -126,9 +126,7 @@ class Sweep:
         state = self._exploration.first()
         items = self._exploration.items
         row = [
-            self._locals.of(
-                process, [n for n in state.pending if items[n].zid.startswith(machine)]
-            )
+            self._locals.of(process, [n for n in state.pending if items[n].zid.startswith(machine)])
             for process, machine in zip(state.processes, self._exploration.machines, strict=True)
         ]
         rest = Rest(
@@ -208,9 +206,7 @@ class Sweep:
 
         def add(kind: int, machine: int, row: Array, *read: Array) -> None:
             key = hashes_of(np.full(len(row), kind << 8 | machine), *read)
-            parts.append(
-                _Choices(row, np.full(len(row), kind), np.full(len(row), machine), key)
-            )
+            parts.append(_Choices(row, np.full(len(row), kind), np.full(len(row), machine), key))
 
         dues = np.column_stack([facts["due"][local] for local in locals_])
         owns = np.logical_or.reduce([facts["own"][local] for local in locals_])

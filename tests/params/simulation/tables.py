@@ -155,6 +155,7 @@ def hashes_of(*columns: Array) -> Array:
         total += np.uint64(0x9E3779B97F4A7C15)
     return total
 
+
 def looked_up(index: Index, keys: Array, make: Callable[[int], int]) -> Array:
     """Return the values of keys; make those that are not there."""
     values = index.of(keys.view(np.uint64))
