@@ -65,6 +65,7 @@ class LocalStates:
         self._bundles = Numbers(())
         self._of_process: dict[int, dict[str, Any]] = {}
         lives = 2 + script.crashes + len(script.steps)
+        self._sessions = 1 + lives * len(exploration.machines)
         self.facts = Facts(
             process=(np.int32, 0),
             zid=(np.int64, 0),
@@ -75,7 +76,7 @@ class LocalStates:
             own=(bool, 0),
             loses=(bool, 0),
             looks=(bool, 0),
-            asks=(np.uint64, 1 + lives * len(exploration.machines)),
+            asks=(np.uint64, self._sessions),
             judged=(np.int64, 0),
         )
         self._with_more, self._without_looks = Index(), Index()
@@ -112,7 +113,7 @@ class LocalStates:
     def _note(self, local: Local) -> None:
         exploration = self._exploration
         items = [exploration.items[number] for number in local.items]
-        asks = [0] * self.facts["asks"].shape[1]
+        asks = [0] * self._sessions
         for zid, query in (item.query for item in items if item.query):
             asks[self._zids.of(zid)] |= 1 << query
         if not local.process:

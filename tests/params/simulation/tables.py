@@ -41,18 +41,28 @@ class Facts:
             name: np.zeros((1024, width) if width else 1024, kind)
             for name, (kind, width) in kinds.items()
         }
+        self._added: list[dict[str, Any]] = []
 
     def __getitem__(self, name: str) -> Array:
+        if self._added:
+            self._store()
         return self._arrays[name]
 
     def add(self, **facts: Any) -> None:
-        """Add the facts about the thing that comes next."""
-        for name, value in facts.items():
-            array = self._arrays[name]
-            if self.size == len(array):
-                array = self._arrays[name] = np.concatenate([array, np.zeros_like(array)])
-            array[self.size] = value
+        """Add the facts about the thing that comes next; those that are not given are 0."""
+        self._added.append(facts)
         self.size += 1
+
+    def _store(self) -> None:
+        added, self._added = self._added, []
+        first = self.size - len(added)
+        for name, known in self._arrays.items():
+            none = np.zeros(known.shape[1:], known.dtype)
+            if self.size > len(known):
+                more = np.zeros((self.size, *known.shape[1:]), known.dtype)
+                self._arrays[name] = np.concatenate([known, more])
+            values = [facts.get(name, none) for facts in added]
+            self._arrays[name][first : self.size] = values
 
 
 class Hashes:
