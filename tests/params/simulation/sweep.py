@@ -16,8 +16,13 @@ Nothing is lost by that:
 - Two states with one hash would be taken for one. With ten million states the chance that there is
   any such pair is one in 300 000; with a billion, one in 40.
 
-A test compares it with the search that makes each move by itself. Worlds that take longer than a
-test may are explored by ``python -m tests.params.simulation --explore NAME…``.
+No order is left out. To make only the moves of one replica in a state would be sound if nothing
+that the others may still do could come before them; but any other may send something to it or
+crash, and its links may be cut.
+
+Tests compare it with the search that makes each move by itself, also on cores with faults.
+Worlds that take longer than a test may are explored by
+``python -m tests.params.simulation --explore NAME…``.
 """
 
 from __future__ import annotations
