@@ -121,7 +121,7 @@ class History:
         """Add writes, in any order and any number of times, as one change of the tree.
 
         Returns:
-            The writes that are new: neither known nor hidden by a newer one.
+            The writes that are new, as they are held: neither known nor hidden by a newer one.
 
         Raises:
             ParamError: The tree cannot hold a write; nothing is changed then.
@@ -134,7 +134,7 @@ class History:
         for write in incoming:
             replayed = self._add(write)
             if replayed:
-                new.append(write)
+                new.append(replayed[0])
                 steps += replayed
         if steps:
             draft = Draft(self.root)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rosz.errors import PartlyWritten
 from rosz.params.replica.core import effects as done
 from rosz.params.replica.core import events as said
-from rosz.params.writes import put
+from rosz.params.writes import DELETED, put
 
 from .dialogue import WALL, Dialogue, batch, member, writer
 
@@ -125,3 +125,14 @@ def test_nothing_is_acknowledged_while_what_failed_is_saved_again() -> None:
     talk.say(said.Saved(third.number))
     acknowledged = [(ack.number, ack.query, ack.reason) for ack in talk.all(done.Acknowledge)]
     assert acknowledged == [(2, 0, ""), (1, 9, ""), (3, 0, "")]
+
+
+def test_of_a_dict_before_the_horizon_only_what_is_proven_is_saved() -> None:
+    talk = Dialogue(stored=True)
+    talk.say(said.Loaded([put(("m",), (WALL, "c0"), {"x": 1})], horizon=WALL + 9))
+    talk.join(B)
+    talk.say(said.BatchReceived("bb", 1, batch("m", {"x": 2, "y": "perhaps deleted"}, WALL + 5)))
+    save = talk.only(done.Save)
+    assert [(write.path, write.value) for write in save.writes] == [(("m",), DELETED)]
+    assert talk.core.history.find(("m",)) == save.writes[0]
+    assert talk.core.history.root == {}

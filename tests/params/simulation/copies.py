@@ -35,6 +35,11 @@ _IGNORED: Final = frozenset(
 
 
 _NUMBERED: Final = frozenset({"queries", "_queries"})
+_FIXED: Final = frozenset({int, float, bool, str, bytes, tuple, frozenset, type(None), Write})
+"""Types of what never changes, unless a tuple holds what does; such tuples are not used."""
+
+_PLAIN: Final = frozenset({int, float, bool, str, bytes, type(None)})
+"""Types of what has itself as its form."""
 
 
 def clone(thing: Any, memo: dict[int, Any]) -> Any:
@@ -47,12 +52,18 @@ def clone(thing: Any, memo: dict[int, Any]) -> Any:
     return thing if cloner is None else cloner(thing, memo)
 
 
+def _clone_values(values: dict[Any, Any], memo: dict[int, Any]) -> dict[Any, Any]:
+    made = values.copy()
+    for key, value in values.items():
+        if type(value) not in _FIXED:
+            made[key] = clone(value, memo)
+    return made
+
+
 def _clone_dict(thing: dict[Any, Any], memo: dict[int, Any]) -> Any:
     made = memo.get(id(thing))
     if made is None:
-        made = memo[id(thing)] = {}
-        for key, value in thing.items():
-            made[key] = clone(value, memo)
+        made = memo[id(thing)] = _clone_values(thing, memo)
     return made
 
 
@@ -100,13 +111,11 @@ def _clone_object(thing: Any, memo: dict[int, Any]) -> Any:
     if made is None:
         made = memo[id(thing)] = object.__new__(type(thing))
         target = made.__dict__
+        target.update(thing.__dict__)
         for name, value in thing.__dict__.items():
-            if name in _SHARED:
-                target[name] = value
-            elif name in _FLAT:
-                target[name] = value.copy()
-            else:
-                target[name] = clone(value, memo)
+            if type(value) in _FIXED or name in _SHARED:
+                continue
+            target[name] = value.copy() if name in _FLAT else clone(value, memo)
     return made
 
 
@@ -135,62 +144,80 @@ class Form:
 
     def __init__(self) -> None:
         self._met: dict[int, int] = {}
-        self._forms: dict[type, Callable[[Any], Any]] = {
-            list: self._of_list,
-            tuple: self._of_list,
-            set: self._of_set,
-            frozenset: self._of_set,
-            dict: self._of_dict,
-            Write: lambda write: (write.path, write.time, write.clock),
-        }
 
     def of(self, thing: Any) -> Any:
         """Return a hashable value that is equal for things that are alike."""
         kind = type(thing)
         try:
-            form = self._forms[kind]
+            form = _FORMS[kind]
         except KeyError:
-            form = self._forms[kind] = self._form_of(kind)
-        return form(thing)
+            form = _FORMS[kind] = _form_of(kind)
+        return form(self, thing)
 
-    def _of_list(self, things: Any) -> Any:
-        return tuple([self.of(thing) for thing in things])
+    def of_list(self, things: Any) -> Any:
+        """Return the form of things in an order."""
+        return tuple([thing if type(thing) in _PLAIN else self.of(thing) for thing in things])
 
-    def _of_set(self, things: Any) -> Any:
-        return frozenset([self.of(thing) for thing in things])
+    def of_set(self, things: Any) -> Any:
+        """Return the form of things without an order."""
+        return frozenset([thing if type(thing) in _PLAIN else self.of(thing) for thing in things])
 
-    def _of_dict(self, things: Any) -> Any:
-        return frozenset([(self.of(key), self.of(value)) for key, value in things.items()])
-
-    def _of_struct(self, thing: Any) -> Any:
-        names = thing.__struct_fields__
-        return tuple([self.of(getattr(thing, name)) for name in names if name not in _IGNORED])
-
-    def _of_history(self, thing: History) -> Any:
-        return self._of_set(thing.writes()), thing.horizon, thing.latest
-
-    def _of_object(self, thing: Any) -> Any:
-        if id(thing) in self._met:
-            return self._met[id(thing)]
-        self._met[id(thing)] = len(self._met)
-        return tuple(
+    def of_dict(self, things: Any) -> Any:
+        """Return the form of a dict."""
+        of = self.of
+        return frozenset(
             [
-                # Queries are alike whatever their numbers; those on their way have others.
-                self.of([value[key] for key in sorted(value)] if name in _NUMBERED else value)
-                for name, value in thing.__dict__.items()
-                if name not in _IGNORED
+                (
+                    key if type(key) in _PLAIN else of(key),
+                    value if type(value) in _PLAIN else of(value),
+                )
+                for key, value in things.items()
             ]
         )
 
-    def _form_of(self, kind: Any) -> Callable[[Any], Any]:
-        if issubclass(kind, msgspec.Struct):
-            return self._of_struct
-        if issubclass(kind, tuple):
-            return self._of_list
-        if issubclass(kind, enum.Enum):
-            return lambda thing: thing.name
-        if kind is History:
-            return self._of_history
-        if kind is Work or kind in (types.MethodType, types.FunctionType, itertools.count):
-            return lambda _: None
-        return self._of_object if kind.__module__ != "builtins" else lambda thing: thing
+    def of_history(self, thing: History) -> Any:
+        """Return the form of a set of writes."""
+        return self.of_set(thing.writes()), thing.horizon, thing.latest
+
+    def of_object(self, thing: Any) -> Any:
+        """Return the form of an object; of one that was met, its number."""
+        if id(thing) in self._met:
+            return self._met[id(thing)]
+        self._met[id(thing)] = len(self._met)
+        form: list[Any] = []
+        for name, value in thing.__dict__.items():
+            if name in _IGNORED:
+                continue
+            if type(value) in _PLAIN:
+                form.append(value)
+            elif name in _NUMBERED:
+                # Queries are alike whatever their numbers; those on their way have others.
+                form.append(self.of([value[key] for key in sorted(value)]))
+            else:
+                form.append(self.of(value))
+        return tuple(form)
+
+
+def _form_of(kind: Any) -> Callable[[Form, Any], Any]:
+    """Return how to get the form of things of a kind."""
+    if issubclass(kind, msgspec.Struct):
+        names = [name for name in kind.__struct_fields__ if name not in _IGNORED]
+        return lambda form, thing: form.of_list([getattr(thing, name) for name in names])
+    if issubclass(kind, tuple):
+        return Form.of_list
+    if issubclass(kind, enum.Enum):
+        return lambda _, thing: thing.name
+    if kind is Work or kind in (types.MethodType, types.FunctionType, itertools.count):
+        return lambda *_: None
+    return Form.of_object if kind.__module__ != "builtins" else lambda _, thing: thing
+
+
+_FORMS: Final[dict[type, Callable[[Form, Any], Any]]] = {
+    list: Form.of_list,
+    tuple: Form.of_list,
+    set: Form.of_set,
+    frozenset: Form.of_set,
+    dict: Form.of_dict,
+    History: Form.of_history,
+    Write: lambda _, write: (write.path, write.time, write.clock),
+}

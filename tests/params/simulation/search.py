@@ -23,6 +23,7 @@ class Result(msgspec.Struct):
         ends: Number of states in which nothing was left to happen.
         finals: Hashes of these states, the same for each search of a world.
         processes: Number of different states of processes, those of quiet times among them.
+        locals: Number of these with what is on its way to them, if that was counted.
         steps: Steps of cores that were made; the others were known.
         finished: Whether all states were explored.
         seconds: How long it took.
@@ -34,6 +35,7 @@ class Result(msgspec.Struct):
     ends: int = 0
     finals: set[int] = set()
     processes: int = 0
+    locals: int = 0
     steps: int = 0
     finished: bool = True
     seconds: float = 0.0
@@ -43,8 +45,8 @@ class Result(msgspec.Struct):
         end = "all" if self.finished else "not all"
         return (
             f"{self.states} states ({end}), {self.moves} moves, {self.ends} ends,"
-            f" {self.processes} states of processes, {self.steps} steps,"
-            f" {self.seconds:.1f} s\n{self.finding}"
+            f" {self.processes} states of processes, {self.locals} local states,"
+            f" {self.steps} steps, {self.seconds:.1f} s\n{self.finding}"
         ).rstrip()
 
 

@@ -17,7 +17,8 @@ from .answers import Answers
 from .copies import Form, clone
 from .disk import Disk
 from .process import Alarm, Process, State
-from .world import Finish, Item, Reconcile, Report, Setting, World
+from .schedule import Finish, Item, Reconcile, Report
+from .world import Setting, World
 
 URGENT = frozenset({"delivery", "call", "appeared", "save again", "query the next", "find more"})
 """Timers that may fire before anything else; the others fire in the quiet time."""

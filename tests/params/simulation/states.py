@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .world import line_of
+from .violation import line_of
 
 
 class Item(NamedTuple):

@@ -62,11 +62,12 @@ def _compare(script: Script) -> None:
     ],
     ids=lambda value: getattr(value, "__name__", value),
 )
-def test_a_fault_is_found(mutation: Mutation, name: str) -> None:
+def test_a_search_and_a_sweep_find_a_fault(mutation: Mutation, name: str) -> None:
     with faulty(mutation):
-        result = explore(SCRIPTS[name], 2000)
-    print(f"{mutation.__name__}: {result.states} states: {result.finding.splitlines()[:1]}")
-    assert result.finding
+        results = explore(SCRIPTS[name], 2000), sweep(SCRIPTS[name], 10_000)
+    for result in results:
+        print(f"{mutation.__name__}: {result.states} states: {result.finding.splitlines()[:1]}")
+    assert all(result.finding for result in results)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,10 @@ def test_what_must_hold_holds(setting: Setting, seed: int, actions: list[Action]
 
 @pytest.mark.parametrize(
     ("seed", "length", "rounds"),
-    [(227, 40, 1), (611, 40, 1), (786, 40, 1), (2233, 40, 1), (2870001056, 90, 2)],
+    [
+        *((227, 40, 1), (611, 40, 1), (786, 40, 1), (2233, 40, 1), (2870001056, 90, 2)),
+        *((810000025, 90, 2), (810001706, 90, 2)),
+    ],
 )
 def test_what_once_failed_holds(seed: int, length: int, rounds: int) -> None:
     play_seed(seed, length, rounds)

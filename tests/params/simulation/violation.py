@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from rosz.params.replica.core import effects as done
 
 if TYPE_CHECKING:
     from .process import Process
@@ -22,3 +24,13 @@ def fail(world: World, process: Process, text: str) -> NoReturn:
         text: What is wrong.
     """
     raise Violation(f"{process.zid} {text}\n{world.setting}\nseed {world.seed}\n{world.story()}")
+
+
+def line_of(what: Any) -> str:
+    """Return a line of a trace: what a process was told or did."""
+    if isinstance(what, str):
+        return f"-- {what}"
+    head = "  =>" if isinstance(what, done.Effect) else "<="
+    if isinstance(what, done.TreeChanged):
+        return f"{head} TreeChanged({what.new})"
+    return f"{head} {what!r:.200}"

@@ -24,7 +24,8 @@ from rosz.params.writes import Change, Write
 from .checks import Checks
 from .disk import Disk
 from .process import WALL, Call, Process, State
-from .violation import fail
+from .schedule import Boot, Deliver, Expire, Finish, Fire, Item, Lapse, Reconcile, Relink, Report
+from .violation import fail, line_of
 
 LEASE = 10.0
 """Seconds after which the links to a process that stands still are given up."""
@@ -53,74 +54,6 @@ class Setting(msgspec.Struct, frozen=True):
     repeats: float = 0.0
     slow: float = 0.0
     scoped: bool = False
-
-
-class Item(msgspec.Struct, frozen=True):
-    """Something that happens later; the base class of all items."""
-
-
-class Deliver(Item, frozen=True):
-    """An event reaches a process, over the link from a machine if there is a source."""
-
-    zid: str
-    event: said.Event
-    source: str = ""
-
-
-class Fire(Item, frozen=True):
-    """A timer fires, unless another one took its place."""
-
-    zid: str
-    timer: said.Timer
-    call: int
-    ident: int
-
-
-class Finish(Item, frozen=True):
-    """The disk of a process is done with some saves."""
-
-    zid: str
-
-
-class Reconcile(Item, frozen=True):
-    """A process sees whether another one is there."""
-
-    zid: str
-    other: str
-
-
-class Report(Item, frozen=True):
-    """A process that begins to follow all others is told who is there."""
-
-    zid: str
-    watch: int
-
-
-class Expire(Item, frozen=True):
-    """A query of a process has taken its time."""
-
-    zid: str
-    number: int
-
-
-class Lapse(Item, frozen=True):
-    """The lease of a process that stands still is over."""
-
-    zid: str
-    since: float
-
-
-class Relink(Item, frozen=True):
-    """A process that stood still finds the others again."""
-
-    zid: str
-
-
-class Boot(Item, frozen=True):
-    """A program starts on a machine, perhaps with what another one left to it."""
-
-    machine: str
-    handover: tuple[list[Write], int] | None = None
 
 
 class World:
@@ -658,13 +591,3 @@ class World:
         """Return the trace as text."""
         lines = [f"{time:9.4f} {zid:3} {line_of(what)}" for time, zid, what in self.trace]
         return "\n".join(lines[-last:])
-
-
-def line_of(what: Any) -> str:
-    """Return a line of a trace: what a process was told or did."""
-    if isinstance(what, str):
-        return f"-- {what}"
-    head = "  =>" if isinstance(what, done.Effect) else "<="
-    if isinstance(what, done.TreeChanged):
-        return f"{head} TreeChanged({what.new})"
-    return f"{head} {what!r:.200}"
