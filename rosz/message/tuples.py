@@ -10,7 +10,6 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Iterator
 from functools import cache, partial
-from operator import ge, gt, le, lt
 from struct import Struct, calcsize
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
@@ -26,10 +25,6 @@ if TYPE_CHECKING:
     _Array = array[Any]
 else:  # Python 3.11's array takes no type argument
     _Array = array
-
-
-def _compare(operator: Callable[[Any, Any], bool]) -> Callable[[Any, Any], bool]:
-    return lambda one, other: operator(tuple(one), tuple(other))
 
 
 class LongTuple(_Array):
@@ -51,12 +46,23 @@ class LongTuple(_Array):
         equal = self.__eq__(other)
         return equal if equal is NotImplemented else not equal
 
-    __lt__, __le__, __gt__, __ge__ = map(_compare, (lt, le, gt, ge))
+    def __lt__(self, other: Any) -> bool:
+        return tuple(self) < tuple(other)
 
-    def __copy__(self, *_memo: object) -> LongTuple:
+    def __le__(self, other: Any) -> bool:
+        return tuple(self) <= tuple(other)
+
+    def __gt__(self, other: Any) -> bool:
+        return tuple(self) > tuple(other)
+
+    def __ge__(self, other: Any) -> bool:
+        return tuple(self) >= tuple(other)
+
+    def __copy__(self) -> LongTuple:
         return self
 
-    __deepcopy__ = __copy__
+    def __deepcopy__(self, memo: object) -> LongTuple:
+        return self
 
     def __hash__(self) -> int:  # type: ignore[override]
         return hash(tuple(self))
@@ -74,12 +80,17 @@ class LongTuple(_Array):
     def __radd__(self, other: Any) -> Any:
         return other + tuple(self)
 
-    __iadd__ = __add__
+    def __iadd__(self, other: Any) -> Any:
+        return tuple(self) + _plain(other)
 
     def __mul__(self, times: Any) -> Any:
         return tuple(self) * times
 
-    __rmul__ = __imul__ = __mul__
+    def __rmul__(self, times: Any) -> Any:
+        return tuple(self) * times
+
+    def __imul__(self, times: Any) -> Any:
+        return tuple(self) * times
 
     def __setitem__(self, index: Any, value: Any) -> None:
         raise TypeError("'tuple' object does not support item assignment")
