@@ -209,8 +209,8 @@ class JointStatePublisher:
         message = JointState(name=list(self.names))
         message.header.stamp = Time.from_nsec(self._node.now())
         for field in _STATE:
-            known = any(getattr(joint, field) is not None for joint in self.joints.values())
-            if known or (field == "position" and self.mimics):
+            is_given = any(getattr(joint, field) is not None for joint in self.joints.values())
+            if is_given or (field == "position" and self.mimics):
                 setattr(message, field, self._values(field))
         return message
 

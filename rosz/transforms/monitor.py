@@ -115,7 +115,7 @@ class FrameParents:
     def several(self) -> dict[str, dict[str, bytes]]:
         """Return the frames with several parents now, each with the publishers of its parents."""
         earliest = time.monotonic() - _PAUSE
-        found: dict[str, dict[str, bytes]] = {}
+        parents: dict[str, dict[str, bytes]] = {}
         for frame, times in self._times.items():
             recent = [(pair, span) for pair, span in times.items() if span[1] >= earliest]
             for (parent, publisher), (first, last) in recent:
@@ -123,8 +123,8 @@ class FrameParents:
                     other != parent and first <= ended and began <= last
                     for (other, _), (began, ended) in recent
                 ):
-                    found.setdefault(frame, {})[parent] = publisher
-        return found
+                    parents.setdefault(frame, {})[parent] = publisher
+        return parents
 
 
 class Monitor:
