@@ -60,6 +60,8 @@ def main() -> int:
     )
     parser.add_argument("--states", type=int, default=1 << 32, help="states to explore at most")
     parser.add_argument("--calls", type=int, help="explore only the first calls of a world")
+    parser.add_argument("--cuts", type=int, help="cuts of links in a world")
+    parser.add_argument("--crashes", type=int, help="crashes in a world")
     parser.add_argument("--timers", type=int, help="timers that may fire early in a world")
     arguments = parser.parse_args()
     if arguments.explore:
@@ -67,8 +69,13 @@ def main() -> int:
         for name in arguments.explore:
             script = SCRIPTS[name]
             steps = script.steps[: arguments.calls]
-            timers = script.advances if arguments.timers is None else arguments.timers
-            script = structs.replace(script, steps=steps, advances=timers)
+            given = {
+                "cuts": arguments.cuts,
+                "crashes": arguments.crashes,
+                "advances": arguments.timers,
+            }
+            changes = {name: count for name, count in given.items() if count is not None}
+            script = structs.replace(script, steps=steps, **changes)
             result = sweep(script, arguments.states, tell)
             print(f"{name}: {result}", flush=True)
             findings += bool(result.finding)
