@@ -157,13 +157,7 @@ _FROM_CDR = _Statements(
     ),
     align=("p += -p & {mask}",),
     copy=("add(data[p:p + {size}])", "p += {size}"),
-    text=(
-        "n, = length(data, p)",
-        "p += 4",
-        "add(pack(n - 1))",
-        "add(data[p:p + n - 1])",
-        "p += n",
-    ),
+    text=("n, = length(data, p)", "p += 4", "add(pack(n - 1))", "add(data[p:p + n - 1])", "p += n"),
     seq="add(seq)",
     end=(
         "        if p > len(data): raise ValueError",

@@ -10,12 +10,7 @@ is imported on its own, since start-up needs few of them.
 
 from rosz.ros1.importer import install
 
-PUBLIC_MODULES = (
-    "__main__",
-    "modules",
-    "python2",
-    "python_setup",
-)
+PUBLIC_MODULES = ("__main__", "modules", "python2", "python_setup")
 
 __all__ = ("install",)
 

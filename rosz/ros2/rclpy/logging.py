@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
+from weakref import WeakValueDictionary
 
 from rosz.errors import UsageError
 from rosz.msgs.rcl_interfaces.msg import LoggerLevel, SetLoggerLevelsResult
@@ -178,6 +179,26 @@ def write_as_rclpy(log: NodeLog, name: str) -> None:
             log.removeHandler(handler)
     text_format = os.environ.get("RCUTILS_CONSOLE_OUTPUT_FORMAT") or _DEFAULT_FORMAT
     log.addHandler(_Console(name, log.manager.problems.append, text_format))
+    _logs[name] = log
+    if name in _levels:
+        log.setLevel(_levels[name])
+
+
+_logs: WeakValueDictionary[str, NodeLog] = WeakValueDictionary()
+_levels: dict[str, int] = {}
+
+
+def set_logger_level(name: str, level: int, detailed_error: bool = False) -> None:  # noqa: ARG001
+    """Let a logger, also one to come, log only messages of this severity or a higher one."""
+    name = name.strip("/").replace("/", ".")
+    _levels[name] = int(level)
+    if name in _logs:
+        _logs[name].setLevel(int(level))
+
+
+def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
+    """Return a severity by its name; a `KeyError` if there is none."""
+    return LoggingSeverity[log_severity.upper()]
 
 
 def get_logger(name: str) -> RcutilsLogger:

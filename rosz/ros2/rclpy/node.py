@@ -437,13 +437,11 @@ class Node(NodeParameters):
         """Return the number of subscriptions of a topic."""
         return len(self._rosz_entities(Kind.SUBSCRIPTION, topic_name))
 
-    def get_publishers_info_by_topic(self, topic_name: str, **_: bool) -> list[TopicEndpointInfo]:
+    def get_publishers_info_by_topic(self, topic_name: str, **_: Any) -> list[TopicEndpointInfo]:
         """Return the publishers of a topic."""
         return [*map(TopicEndpointInfo, self._rosz_entities(Kind.PUBLISHER, topic_name))]
 
-    def get_subscriptions_info_by_topic(
-        self, topic_name: str, **_: bool
-    ) -> list[TopicEndpointInfo]:
+    def get_subscriptions_info_by_topic(self, topic_name: str, **_: Any) -> list[TopicEndpointInfo]:
         """Return the subscriptions of a topic."""
         return [*map(TopicEndpointInfo, self._rosz_entities(Kind.SUBSCRIPTION, topic_name))]
 

@@ -28,12 +28,13 @@ from rosz.msgs.rcl_interfaces.srv import (
 )
 from rosz.msgs.std_msgs.msg import Int32, String
 from rosz.node import MessageInfo
-from rosz.ros2.rclpy import executors, program
+from rosz.ros2.rclpy import executors, logging, program
 from rosz.ros2.rclpy.events import (
     PublisherEventCallbacks,
     SubscriptionEventCallbacks,
     UnsupportedEventTypeError,
 )
+from rosz.ros2.rclpy.node import Node
 from rosz.ros2.rclpy.parameter import Parameter, parameter_dict_from_yaml_file
 from rosz.ros2.rclpy.parameter_client import AsyncParameterClient
 from rosz.ros2.rclpy.qos import (
@@ -197,6 +198,18 @@ class Caller:
         self._world.spin_until(lambda: answers, f"the response of {name}")
         thread.join(TIMEOUT)
         return answers[0]
+
+
+def test_levels_by_the_names_of_loggers(start: Start) -> None:
+    severity = logging.LoggingSeverity
+    logging.set_logger_level("ns/later", severity.ERROR)
+    context = start()
+    now, later = Node("now", context=context), Node("later", namespace="ns", context=context)
+    logging.set_logger_level("now", logging.get_logging_severity_from_string("debug"))
+    assert now.get_logger().get_effective_level() is severity.DEBUG
+    assert later.get_logger().get_effective_level() is severity.ERROR
+    with pytest.raises(KeyError):
+        logging.get_logging_severity_from_string("loud")
 
 
 def test_levels_of_loggers(start: Start, network: Network) -> None:
