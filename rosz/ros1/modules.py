@@ -146,6 +146,8 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
     "rclpy.clock": {
         "rclpy.time": "Clock ClockChange ClockType JumpHandle JumpThreshold ROSClock TimeJump"
     },
+    "rclpy.clock_type": {"rclpy.time": "ClockType"},
+    "rclpy.constants": {"rclpy.time": "S_TO_NS=CONVERSION_CONSTANT"},
     "rclpy.context": {"rclpy.context": "Context"},
     "rclpy.duration": {"rclpy.time": "Duration Infinite"},
     "rclpy.event_handler": {
