@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 app = new_group("List actions, and send goals to them.")
 
 _CANCEL_TIMEOUT = 10.0
+_LATE_SECONDS = 0.2
+"""The wait for feedback that the result has overtaken."""
 _ActionName = Annotated[str, Argument("ACTION", source=suggest.actions)]
 
 
@@ -147,6 +149,8 @@ def _send(
         print_lines([] if as_json else ["canceling the goal"])
         sent.cancel()
         sent.wait(_CANCEL_TIMEOUT)
+    if feedback:
+        time.sleep(_LATE_SECONDS)
     try:
         result = sent.result(0)
     except GoalFailed as error:

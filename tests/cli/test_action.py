@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import shlex
 import signal
+import time
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ from network import TIMEOUT, Network, eventually
 
 from rosz.msgs.example_interfaces.action import Fibonacci
 from rosz.node import Node
+from rosz.node.actions import ClientGoal
 
 from .shell import Shell
 
@@ -79,6 +82,29 @@ def test_send_with_feedback(shell: Shell) -> None:
     assert "feedback:\n  sequence: [-1]\n---" in program.output
     program.send(signal.SIGINT)
     program.wait_for("goal canceled")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "action send -f /robot/fib 5",
+        "ros2 action send_goal -f /robot/fib example_interfaces/action/Fibonacci '{order: 5}'",
+    ],
+)
+def test_feedback_that_the_result_overtakes(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    receive = ClientGoal.receive_feedback
+
+    def receive_late(goal: ClientGoal, feedback: Any) -> None:
+        goal.wait(TIMEOUT)
+        time.sleep(0.02)  # the delay of a slow network
+        receive(goal, feedback)
+
+    monkeypatch.setattr(ClientGoal, "receive_feedback", receive_late)
+    result = shell(*shlex.split(words))
+    assert result.code == 0, result
+    assert "feedback:" in result.out.lower().partition("result:")[0]
 
 
 @pytest.mark.parametrize(

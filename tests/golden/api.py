@@ -51,10 +51,10 @@ _TABLE = {
     "parameter_generator_catkin server",
     "rostest": "",
     "rosunit": "",
-    "rclpy": "callback_groups client clock context duration event_handler exceptions executors "
-    "guard_condition lifecycle logging node parameter parameter_client publisher qos "
-    "qos_overriding_options serialization service signals subscription task time timer utilities "
-    "wait_for_message",
+    "rclpy": "callback_groups client clock clock_type constants context duration event_handler "
+    "exceptions executors guard_condition lifecycle logging node parameter parameter_client "
+    "publisher qos qos_overriding_options serialization service signals subscription "
+    "task time timer utilities wait_for_message",
     "sensor_msgs_py": "point_cloud2",
 }
 """Packages and their public modules, by the names that users import."""

@@ -90,15 +90,23 @@ def city(network: Network) -> Network:
     return network
 
 
-def start(city: Network, interpreter: str, mode: str) -> Program:
-    """Start the node with the older Zenoh, called ``/old``."""
+def start(city: Network, interpreter: str, mode: str, type_hash: str = "") -> Program:
+    """Start the node with the older Zenoh, called ``/old``.
+
+    Args:
+        city: Its network.
+        interpreter: The interpreter with the older Zenoh.
+        mode: Mode of its session.
+        type_hash: What stands for the hash of each type.
+    """
     string, add = String._type_name, AddTwoInts._type_name
+    string_hash, add_hash = type_hash or String._type_hash, type_hash or AddTwoInts._type_hash
     rows = [
         (Kind.NODE, "", "", "", None),
-        (Kind.PUBLISHER, "/from_old", string, String._type_hash, DEFAULT),
-        (Kind.SUBSCRIPTION, "/to_old", string, String._type_hash, DEFAULT),
-        (Kind.SERVICE, "/old_add", add, AddTwoInts._type_hash, SERVICES),
-        (Kind.CLIENT, "/add", add, AddTwoInts._type_hash, SERVICES),
+        (Kind.PUBLISHER, "/from_old", string, string_hash, DEFAULT),
+        (Kind.SUBSCRIPTION, "/to_old", string, string_hash, DEFAULT),
+        (Kind.SERVICE, "/old_add", add, add_hash, SERVICES),
+        (Kind.CLIENT, "/add", add, add_hash, SERVICES),
     ]
     tokens = [
         format_token(
@@ -118,10 +126,10 @@ def start(city: Network, interpreter: str, mode: str) -> Program:
     plan = {
         "config": config,
         "tokens": tokens,
-        "talk": entity_key(city.domain, "/from_old", string, String._type_hash),
-        "listen": entity_key(city.domain, "/to_old", string, String._type_hash),
-        "serve": entity_key(city.domain, "/old_add", add, AddTwoInts._type_hash),
-        "call": entity_key(city.domain, "/add", add, AddTwoInts._type_hash),
+        "talk": entity_key(city.domain, "/from_old", string, string_hash),
+        "listen": entity_key(city.domain, "/to_old", string, string_hash),
+        "serve": entity_key(city.domain, "/old_add", add, add_hash),
+        "call": entity_key(city.domain, "/add", add, add_hash),
     }
     program = city.execute(interpreter, "-c", dedent(PARTNER), json.dumps(plan))
     program.wait_for("up")
@@ -182,3 +190,10 @@ def test_before_a_core(city: Network, interpreter: str) -> None:
 def test_without_a_router(city: Network, interpreter: str) -> None:
     node = city.node("new")
     talk(node, start(city, interpreter, "peer"))
+
+
+def test_humble(city: Network) -> None:
+    """Its types have no hashes."""
+    with Router(city.environment()):
+        old = start(city, str(old_zenoh()), "peer", "TypeHashNotSupported")
+        talk(city.node("new", context=city.context(distro="humble")), old)

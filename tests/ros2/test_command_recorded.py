@@ -39,6 +39,17 @@ def test_recorded_line(world: Ros2, row: dict[str, Any]) -> None:
     assert (code, lines, err) == (row["exit"], expected, row["stderr"])
 
 
+def test_the_parameter_that_no_node_changes(world: Ros2) -> None:
+    name = "start_type_description_service"
+    assert world("param", "set", "/talker", name, "false") == (
+        0,
+        "",
+        f"Setting parameter failed: Trying to set a read-only parameter: {name}.\n",
+    )
+    described = world("param", "describe", "/talker", name).out.splitlines()
+    assert described[1:] == ["  Type: boolean", "  Constraints:", "    Read only: true"]
+
+
 def test_a_list_imports_nothing_slow(world: Ros2) -> None:
     code = """
     import sys

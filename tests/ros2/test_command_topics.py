@@ -203,6 +203,17 @@ def test_measuring(ros2: Ros2) -> None:
     both.wait_for(re.compile(r"^/others +[\d.]+ "))
 
 
+@pytest.mark.parametrize("option", ["", "--include-hidden-topics"])
+def test_hidden_topics_of_a_bag(ros2: Ros2, tmp_path: Path, option: str) -> None:
+    node = ros2.network.node("robot")
+    recorder = ros2.start("bag", "record", "-a", *option.split(), "-o", str(tmp_path / "run"))
+    recorder.wait_for("Subscribing to /rosout")
+    for topic in ("/arm/_state", "/text"):  # in this order, so do others hear of them
+        node.publisher(topic, String)
+    recorder.wait_for("Subscribing to /text")
+    assert ("Subscribing to /arm/_state" in recorder.lines) == bool(option)
+
+
 def test_a_bag(ros2: Ros2, tmp_path: Path) -> None:
     ros2.start("topic", "pub", "-r", "50", "-p", "0", "/text", "std_msgs/msg/String", "data: hi")
     folder = tmp_path / "run"

@@ -34,6 +34,8 @@ def record(given: Namespace) -> int | str:
     split = bool(given.max_bag_size or given.max_bag_duration)
     folder.mkdir(parents=True)
     left_out = [given.exclude_regex] if given.exclude_regex else []
+    if (everything or given.regex) and not given.hidden:
+        left_out.append(f"(?!.*{_EVENTS}$).*/_.*")
     line = RecordLine(
         topics=[f".*(?:{given.regex}).*"] if given.regex and not everything else topics,
         every=everything,

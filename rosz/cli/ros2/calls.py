@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _FOREVER = threading.TIMEOUT_MAX / 2
 _AT_ONCE = 1.0
 _CANCEL_SECONDS = 10.0
+_LATE_SECONDS = 0.2
+"""The wait for feedback that the result has overtaken."""
 
 
 def read_values(text: str) -> Any:
@@ -110,8 +112,9 @@ def _follow(client: Any, goal: Any, *, feedback: bool) -> None:
         print_lines(["Goal was rejected."])
         return
     print_lines([f"Goal accepted with ID: {sent.id.hex}\n"])
-    for part in sent:
-        if feedback:
+    for late in (0.0, _LATE_SECONDS) if feedback else ():
+        time.sleep(late)
+        for part in sent:
             print_lines([f"Feedback:\n    {to_yaml(part)}"])
     try:
         result = sent.result()

@@ -80,7 +80,9 @@ class Ros2Parameters:
         """Return descriptions of some parameters, which may be set to values of any type."""
         owner = self._node.parameter_owner
         if owner is not None:
-            own = _described(_DESCRIBES_TYPES, True)
+            own = ParameterDescriptor(
+                _DESCRIBES_TYPES, ParameterType.PARAMETER_BOOL, read_only=True
+            )
             wanted = list(names)
             described = owner.describe([name for name in wanted if name != own.name])
             by_name = {each.name: each for each in (*described, own)}
@@ -238,7 +240,11 @@ class Ros2ParameterServices:
 
     def _set(self, parameters: Iterable[Parameter]) -> SetParametersResult:
         if self.node.parameter_owner is not None:
-            result: SetParametersResult = self.node.parameter_owner.change(list(parameters))
+            changes = list(parameters)
+            if any(each.name == _DESCRIBES_TYPES for each in changes):
+                reason = f"Trying to set a read-only parameter: {_DESCRIBES_TYPES}."
+                return SetParametersResult(successful=False, reason=reason)
+            result: SetParametersResult = self.node.parameter_owner.change(changes)
             return result
         try:
             self._parameters.write(parameters)
