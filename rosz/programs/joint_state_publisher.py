@@ -20,6 +20,8 @@ from rosz.msgs.sensor_msgs.msg import JointState
 from rosz.node import Node, serve_loggers
 
 _RIGID = frozenset({"fixed", "floating", "planar"})
+_STATE = ("position", "velocity", "effort")
+"""The parts of the state of a joint, in messages and here."""
 
 
 class DescriptionError(RoszError):
@@ -198,24 +200,18 @@ class JointStatePublisher:
             joint = self.joints.get(name)
             if joint is None:
                 continue
-            if len(message.position):
-                joint.position = message.position[index]
-            if len(message.velocity):
-                joint.velocity = message.velocity[index]
-            if len(message.effort):
-                joint.effort = message.effort[index]
+            for field in _STATE:
+                if len(values := getattr(message, field)):
+                    setattr(joint, field, values[index])
 
     def state(self) -> JointState:
         """Return the states of all joints at this time."""
-        free = self.joints.values()
         message = JointState(name=list(self.names))
         message.header.stamp = Time.from_nsec(self._node.now())
-        if self.mimics or any(joint.position is not None for joint in free):
-            message.position = self._values("position")
-        if any(joint.velocity is not None for joint in free):
-            message.velocity = self._values("velocity")
-        if any(joint.effort is not None for joint in free):
-            message.effort = self._values("effort")
+        for field in _STATE:
+            has_some = any(getattr(joint, field) is not None for joint in self.joints.values())
+            if has_some or (field == "position" and self.mimics):
+                setattr(message, field, self._values(field))
         return message
 
     def _values(self, field: str) -> list[float]:
