@@ -46,7 +46,7 @@ class Registrations:
         self.port = port
         self._changed = changed
         self._watches: dict[RegistryEntry, Watch] = {}
-        self._notifier = Notifier(shared, self.is_registered)
+        self._notifier = Notifier(shared, lambda uri: uri in self.registry.nodes().values())
 
     def topic_uris(self, topic: str, host: str) -> list[str]:
         """Return the URIs of the publishers of a topic for a subscriber of ROS 1.
@@ -77,10 +77,6 @@ class Registrations:
     def node_uri(self, host: str, node: str) -> str:
         """Return the URI of a node of the network for those who reach the bridge at an address."""
         return f"{self.uri(host)[:-1]}{NODE_PATH}{node}/"
-
-    def is_registered(self, uri: str) -> bool:
-        """Return whether a URI is that of a registered node."""
-        return uri in self.registry.nodes().values()
 
     def restore(self, entries: Iterable[RegistryEntry]) -> None:
         """Add registrations of nodes that are known to be alive, unless they have come already.
