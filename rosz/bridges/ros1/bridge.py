@@ -109,11 +109,11 @@ class MasterBridge(Closing):
         self._saving = False
         server.start(master.dispatch, self._mirror.accept)
         self._restore()
-        shared.prober.start(self._registrations.nodes, self._on_probe)
+        shared.prober.start(self._registrations.registry.nodes, self._on_probe)
 
     def nodes(self) -> dict[str, str]:
         """Return the URIs of the nodes that are registered, by name."""
-        return self._registrations.nodes()
+        return self._registrations.registry.nodes()
 
     def close(self) -> None:
         """Close the master; a second call has no effect."""
@@ -133,7 +133,7 @@ class MasterBridge(Closing):
 
     def _save(self) -> None:
         self._saving = False
-        entries = self._registrations.entries()
+        entries = self._registrations.registry.dump()
         new = self._state_file.with_suffix(".new")
         try:
             self._state_file.parent.mkdir(parents=True, exist_ok=True)

@@ -48,7 +48,6 @@ class Master:
         self._shared = shared
         self._registrations = registrations
         self._registry = registrations.registry
-        self._lock = registrations.lock
         self._params = shared.context.params
         self._node_api = node_api
         self._arguments = ArgumentChecker()
@@ -148,8 +147,7 @@ class Master:
         return 1, "", self._registrations.uri(stream.local_host)
 
     def _lookup_node(self, _caller: str, stream: Stream, node: str) -> Answer:
-        with self._lock:
-            uri = self._registry.uri(node)
+        uri = self._registry.uri(node)
         if node == self._shared.name:
             uri = self._registrations.uri(stream.local_host)
         if uri:
@@ -159,8 +157,7 @@ class Master:
         return -1, f"unknown node [{node}]", ""
 
     def _lookup_service(self, _caller: str, stream: Stream, service: str) -> Answer:
-        with self._lock:
-            entries = self._registry.entries("service", service)
+        entries = self._registry.entries("service", service)
         if entries:
             uri = entries[0].service_uri
         elif self._shared.entities(Kind.SERVICE, name=service):
@@ -170,19 +167,15 @@ class Master:
         return 1, f"rosrpc URI: [{uri}]", uri
 
     def _get_published_topics(self, _caller: str, _: Stream, namespace: str) -> Answer:
-        with self._lock:
-            types = self._registry.types()
-            topics = {
-                name: types.get(name, ANY_TYPE) for name in self._registry.by_name("publisher")
-            }
+        types = self._registry.types()
+        topics = {name: types.get(name, ANY_TYPE) for name in self._registry.by_name("publisher")}
         for token in self._shared.entities(Kind.PUBLISHER):
             topics.setdefault(token.name, ros1_type(token.name, token.type_name))
         below = f"{namespace.rstrip('/')}/" if namespace else ""
         return 1, "current topics", [[n, t] for n, t in topics.items() if n.startswith(below)]
 
     def _get_topic_types(self, _caller: str, _: Stream) -> Answer:
-        with self._lock:
-            types = self._registry.types()
+        types = self._registry.types()
         for token in self._shared.entities(Kind.PUBLISHER, Kind.SUBSCRIPTION):
             types.setdefault(token.name, ros1_type(token.name, token.type_name))
         return 1, "current system state", [[name, kind] for name, kind in types.items()]
@@ -196,8 +189,7 @@ class Master:
         )
         state = []
         for role, kind in roles:
-            with self._lock:
-                nodes_by_name = self._registry.by_name(role)
+            nodes_by_name = self._registry.by_name(role)
             for token in () if caller.startswith(BRIDGE) else self._shared.entities(kind):
                 nodes = nodes_by_name.setdefault(token.name, [])
                 if token.node_name not in nodes:

@@ -74,11 +74,8 @@ class Mirror:
         self._nodes: dict[str, BridgedNode] = {}
         self._lock = threading.Lock()
         self._changed: dict[str, bool] = {}
-        shared.lifecycle.keep(
-            Registration(
-                shared.context.graph.listen(self._on_token)
-            )  # ends before the workers that it uses
-        )
+        # It ends before the workers that it uses.
+        shared.lifecycle.keep(Registration(shared.context.graph.listen(self._on_token)))
 
     def apply(self, changes: list[Change]) -> None:
         """Show changes of registrations, soon and in their order; any thread may call it."""

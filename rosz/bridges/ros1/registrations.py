@@ -34,20 +34,19 @@ class Registrations:
         changed: Function called with changes of the registrations, in their order.
 
     Attributes:
-        lock: Is held around each use of `registry`.
         registry: The table.
     """
 
     def __init__(
         self, shared: BridgeResources, port: int, changed: Callable[[list[Change]], object]
     ) -> None:
-        self.lock = threading.RLock()
         self.registry = Registry()
+        self._lock = self.registry.lock
         self._shared = shared
         self.port = port
         self._changed = changed
         self._watches: dict[RegistryEntry, Watch] = {}
-        self._notifier = Notifier(shared, self.is_registered)
+        self._notifier = Notifier(shared, lambda uri: uri in self.registry.nodes().values())
 
     def topic_uris(self, topic: str, host: str) -> list[str]:
         """Return the URIs of the publishers of a topic for a subscriber of ROS 1.
@@ -79,28 +78,13 @@ class Registrations:
         """Return the URI of a node of the network for those who reach the bridge at an address."""
         return f"{self.uri(host)[:-1]}{NODE_PATH}{node}/"
 
-    def is_registered(self, uri: str) -> bool:
-        """Return whether a URI is that of a registered node."""
-        with self.lock:
-            return uri in self.registry.nodes().values()
-
-    def nodes(self) -> dict[str, str]:
-        """Return the URIs of all registered nodes by name."""
-        with self.lock:
-            return self.registry.nodes()
-
-    def entries(self) -> list[RegistryEntry]:
-        """Return all registrations."""
-        with self.lock:
-            return self.registry.dump()
-
     def restore(self, entries: Iterable[RegistryEntry]) -> None:
         """Add registrations of nodes that are known to be alive, unless they have come already.
 
         Subscribers are told who publishes, as rospy does not try to connect to the bridge again by
         itself. They are told when all is added: roscpp leaves publishers that are not in the list.
         """
-        with self.lock:
+        with self._lock:
             restored = [e for e in entries if self.registry.uri(e.node) in {"", e.uri}]
             for entry in restored:
                 self.register(entry)
@@ -109,7 +93,7 @@ class Registrations:
 
     def drop(self, node: str, uri: str) -> bool:
         """Remove a node that has ended; return whether it was registered."""
-        with self.lock:
+        with self._lock:
             if self.registry.uri(node) != uri:
                 return False
             self._apply(self.registry.remove_node(node))
@@ -117,13 +101,12 @@ class Registrations:
 
     def terminate(self, node: str, reason: str) -> None:
         """Ask a node to end."""
-        uri = self.nodes().get(node)
-        if uri:
+        if uri := self.registry.uri(node):
             self._shut_down(node, uri, reason)
 
     def register(self, entry: RegistryEntry) -> None:
         """Add a registration, and ask an older node of the same name to end."""
-        with self.lock:
+        with self._lock:
             older = self.registry.uri(entry.node)
             self._apply(self.registry.register(entry))
         if older not in {"", entry.uri}:
@@ -135,15 +118,14 @@ class Registrations:
 
     def unregister(self, role: Role, name: str, node: str, uri: str) -> bool:
         """Remove a registration; return whether there was one."""
-        with self.lock:
+        with self._lock:
             changes = self.registry.unregister(role, name, node, uri)
             self._apply(changes)
         return bool(changes)
 
     def uris(self, role: Role, topic: str) -> list[str]:
         """Return the URIs of the nodes that are registered for a topic."""
-        with self.lock:
-            return [entry.uri for entry in self.registry.entries(role, topic)]
+        return [entry.uri for entry in self.registry.entries(role, topic)]
 
     def _apply(self, changes: list[Change]) -> None:
         """Act on changes; needs the lock, so that they are reported in their order."""

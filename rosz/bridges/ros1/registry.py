@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Literal
 
 import msgspec
@@ -41,9 +42,14 @@ class Change(msgspec.Struct, frozen=True):
 
 
 class Registry:
-    """Registrations by role and name. The class is not thread-safe."""
+    """Registrations by role and name.
+
+    Attributes:
+        lock: Is held while the table is read, and by those who change it.
+    """
 
     def __init__(self) -> None:
+        self.lock = threading.RLock()
         self._entries: dict[tuple[Role, str], dict[str, RegistryEntry]] = {}
         self._nodes: dict[str, dict[tuple[Role, str], RegistryEntry]] = {}
         self._uris: dict[str, str] = {}
@@ -126,28 +132,34 @@ class Registry:
 
     def entries(self, role: Role, name: str) -> list[RegistryEntry]:
         """Return the registrations for a name, oldest first."""
-        return list(self._entries.get((role, name), {}).values())
+        with self.lock:
+            return list(self._entries.get((role, name), {}).values())
 
     def by_name(self, role: Role) -> dict[str, list[str]]:
         """Return the nodes that are registered in a role, by name."""
-        return {
-            name: list(entries)
-            for (entry_role, name), entries in self._entries.items()
-            if entry_role == role
-        }
+        with self.lock:
+            return {
+                name: list(entries)
+                for (entry_role, name), entries in self._entries.items()
+                if entry_role == role
+            }
 
     def types(self) -> dict[str, str]:
         """Return the known types of topics, by topic."""
-        return dict(self._types)
+        with self.lock:
+            return dict(self._types)
 
     def uri(self, node: str) -> str:
         """Return the URI of a node; empty if it has registered nothing."""
-        return self._uris.get(node, "")
+        with self.lock:
+            return self._uris.get(node, "")
 
     def nodes(self) -> dict[str, str]:
         """Return the URIs of all nodes by name."""
-        return dict(self._uris)
+        with self.lock:
+            return dict(self._uris)
 
     def dump(self) -> list[RegistryEntry]:
         """Return all registrations, oldest first for each name."""
-        return [entry for entries in self._entries.values() for entry in entries.values()]
+        with self.lock:
+            return [entry for entries in self._entries.values() for entry in entries.values()]

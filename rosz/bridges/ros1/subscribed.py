@@ -60,18 +60,16 @@ class SubscribedTopic:
         """Show the node as a subscriber while it is not connected; then adapt the queues."""
         if self._closed:
             return
-        if self._waiting is not None and self._shared.entities(Kind.PUBLISHER, name=self._topic):
+        publishers = self._shared.entities(Kind.PUBLISHER, name=self._topic)
+        if self._waiting is not None and publishers:
             waiting, self._waiting = self._waiting, None
             self.accept(*waiting)
         if self._links:
-            depth = _depth(self._shared.entities(Kind.PUBLISHER, name=self._topic))
+            depth = _depth(publishers)
             for link in self._links:
                 link.stream.depth = depth
             return
-        before, self._published = (
-            self._published,
-            bool(self._shared.entities(Kind.PUBLISHER, name=self._topic)),
-        )
+        before, self._published = self._published, bool(publishers)
         if self._shown is None:
             self._show()
         elif before and not self._published:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 from nicegui import ui
@@ -64,10 +64,11 @@ _TEXTS = {
     "Grid": ("frame", "At the frame"),
     "Robot": ("prefix", "Prefix of its frames"),
 }
-_NUMBERS = {
-    "Axes": ("radius", "Radius (m)", float),
-    "Grid": ("cells", "Cells", int),
-    "nav_msgs/Odometry": ("keep", "Keep", int),
+_Number: TypeAlias = tuple[str, str, type[float]]
+_NUMBERS: dict[str, list[_Number]] = {
+    "Axes": [("radius", "Radius (m)", float)],
+    "Grid": [("cells", "Cells", int)],
+    "nav_msgs/Odometry": [("keep", "Keep", int)],
 }
 """More settings of displays, by their types."""
 _UNITS = dict.fromkeys(_CHOICES, "Pixels")
@@ -314,22 +315,16 @@ class _ShownDisplay:
                 ).props("debounce=400").classes("grow min-w-0")
 
     def _add_numbers(self, kind: str) -> None:
-        if kind not in _OWN_SIZES:
-            ui.number(
-                _UNITS.get(kind, "Size (m)"),
-                value=self.look.size or None,
-                min=0,
-                step=0.1,
-                on_change=lambda e: self._set(size=float(e.value or 0)),
-            ).classes("w-20")
-        if kind in _NUMBERS:
-            key, title, form = _NUMBERS[kind]
+        size: _Number = ("size", _UNITS.get(kind, "Size (m)"), float)
+        numbers = [] if kind in _OWN_SIZES else [size]
+        for key, title, form in (*numbers, *_NUMBERS.get(kind, ())):
             ui.number(
                 title,
                 value=getattr(self.look, key) or None,
                 min=0,
+                step=0.1 if key == "size" else None,
                 precision=0 if form is int else None,
-                on_change=lambda e: self._set(**{key: form(e.value or 0)}),
+                on_change=lambda e, key=key, form=form: self._set(**{key: form(e.value or 0)}),
             ).classes("w-20")
 
     def _set(self, **changes: Any) -> None:

@@ -19,7 +19,7 @@ from rosz.web.scene.drawing import Array, Drawing, Shape, css_of, moved, placed
 from rosz.web.scene.meshes import Meshes
 from rosz.web.scene.poses import pose_from
 from rosz.web.scene.setup import Look
-from rosz.web.scene.shapes import draw_arrows, draw_bars
+from rosz.web.scene.shapes import along_directions, draw_arrows, draw_bars
 
 MARKER_TYPES = frozenset({"visualization_msgs/Marker", "visualization_msgs/MarkerArray"})
 _QUEUE = 100
@@ -209,12 +209,8 @@ def _draw_between(marker: Any, begin: Array, end: Array, drawing: Drawing, color
 
 def _towards(along: Array, origin: Array) -> Array:
     """Return a matrix whose x axis has a direction."""
-    aside = np.array((0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (1.0, 0.0, 0.0))  # noqa: PLR2004
-    second = np.cross(aside, along)
-    second /= np.linalg.norm(second)
     matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1] = along, second
-    matrix[:3, 2], matrix[:3, 3] = np.cross(along, second), origin
+    matrix[:3, :3], matrix[:3, 3] = along_directions(along[None])[0], origin
     return matrix
 
 

@@ -80,6 +80,14 @@ def draw_line(drawing: Drawing, points: Array, color: Array, width: float = 0.0)
         drawing.lines(ends, color)
 
 
+def along_directions(directions: Array) -> Array:
+    """Return rotations as matrices of 3 x 3 numbers, whose x axes are directions of length 1."""
+    aside = np.where(np.abs(directions[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # noqa: PLR2004
+    second = np.cross(aside, directions)
+    second /= np.linalg.norm(second, axis=1)[:, None]
+    return np.stack((directions, second, np.cross(directions, second)), axis=2)
+
+
 def draw_bars(drawing: Drawing, ends: Array, colors: Array, width: float) -> None:
     """Draw lines with a width in metres; every two rows are the ends of one."""
     pairs = np.asarray(ends, dtype=np.float64).reshape(-1, 2, 3)
@@ -91,13 +99,9 @@ def draw_bars(drawing: Drawing, ends: Array, colors: Array, width: float) -> Non
         along[positive] / lengths[positive, None],
         lengths[positive],
     )
-    aside = np.where(np.abs(along[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # noqa: PLR2004
-    second = np.cross(aside, along)
-    second /= np.linalg.norm(second, axis=1)[:, None]
     matrices = np.zeros((len(pairs), 4, 4))
+    matrices[:, :3, :3] = along_directions(along) * width
     matrices[:, :3, 0] = along * (lengths + width / 2)[:, None]
-    matrices[:, :3, 1] = second * width
-    matrices[:, :3, 2] = np.cross(along, second) * width
     matrices[:, :3, 3] = pairs.mean(axis=1)
     matrices[:, 3, 3] = 1.0
     paint = np.broadcast_to(colors, (len(positive), 4))[positive]
