@@ -187,6 +187,8 @@ _BUILT: Mapping[str, str] = {
     " ROSBagFormatException ROSBagUnindexedException TopicTuple TypesAndTopicsTuple",
     "rosbag.rosbag_main": "rosbag: rosbagmain",
     "rosgraph.impl": "",
+    "rosgraph.rosenv": "rosgraph.names: DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP"
+    " ROS_IPV6 ROS_MASTER_URI ROS_NAMESPACE get_master_uri",
     "roslaunch.arg_dump": "roslaunch.node_args: dump_args get_args",
     "roslaunch.launch": "roslaunch.parent: ROSLaunchRunner; roslaunch.core: RLException",
     "roslaunch.nodeprocess": "roslaunch.pmon: LocalProcess=Process",
@@ -206,10 +208,10 @@ _BUILT: Mapping[str, str] = {
     " make_caller_id make_global_ns namespace ns_join resolve_name",
     "roslib.network": "rosgraph.network: ROSHandshakeException create_local_xmlrpc_uri"
     " decode_ros_handshake_header encode_ros_handshake_header get_address_override get_bind_address"
-    " get_host_name get_local_address get_local_addresses is_local_address; rosgraph.rosenv:"
+    " get_host_name get_local_address get_local_addresses is_local_address; rosgraph.names:"
     " ROS_HOSTNAME ROS_IP",
     "roslib.resources": "roslib.packages: list_package_resources list_package_resources_by_dir",
-    "roslib.rosenv": "rosgraph.rosenv: ROS_HOSTNAME ROS_IP ROS_MASTER_URI ROS_NAMESPACE"
+    "roslib.rosenv": "rosgraph.names: ROS_HOSTNAME ROS_IP ROS_MASTER_URI ROS_NAMESPACE"
     " get_master_uri; rospkg: ROS_HOME ROS_LOG_DIR ROS_PACKAGE_PATH ROS_ROOT get_log_dir"
     " get_ros_home get_test_results_dir",
     "roslib.rospack": "roslib.packages: list_pkgs rospack_depends rospack_depends_1"

@@ -178,13 +178,6 @@ def set_arguments(argv: Sequence[str]) -> None:
             state.context.arguments = state.arguments
 
 
-def find_option(options: str | tuple[str, ...], argv: Sequence[str] | None = None) -> str | None:
-    """Return the value of the first of some options, such as ``__ns:=``, or None."""
-    words = (word for word in (sys.argv if argv is None else argv) if word.startswith(options))
-    first = next(words, None)
-    return None if first is None else first.partition(":=")[2]
-
-
 def context() -> Context:
     """Return the context of the process, opened on first use and closed at exit.
 

@@ -6,7 +6,9 @@ register something, since nodes declare themselves.
 Programs also import its modules, as in ROS 1.
 """
 
-from rosz.ros1.tools.rosgraph import masterapi, names, network, rosenv
+from types import ModuleType
+
+from rosz.ros1.tools.rosgraph import masterapi, names, network
 from rosz.ros1.tools.rosgraph.masterapi import (
     Master,
     MasterError,
@@ -14,15 +16,17 @@ from rosz.ros1.tools.rosgraph.masterapi import (
     MasterFailure,
     is_online,
 )
-from rosz.ros1.tools.rosgraph.names import myargv
-from rosz.ros1.tools.rosgraph.rosenv import (
+from rosz.ros1.tools.rosgraph.names import (
     ROS_HOSTNAME,
     ROS_IP,
     ROS_IPV6,
     ROS_MASTER_URI,
     ROS_NAMESPACE,
     get_master_uri,
+    myargv,
 )
+
+rosenv: ModuleType  # built by the importer
 
 __all__ = (
     "ROS_HOSTNAME",

@@ -15,8 +15,7 @@ from rosz.names import ros1_type
 from rosz.params.replica import Params
 from rosz.ros1.exceptions import raised_as
 from rosz.ros1.state import params_of, ready_context, survey, token_uri
-from rosz.ros1.tools.rosgraph.names import make_caller_id, make_global_ns
-from rosz.ros1.tools.rosgraph.rosenv import get_master_uri
+from rosz.ros1.tools.rosgraph.names import get_master_uri, make_caller_id, make_global_ns
 from rosz.wire import Kind, Token
 
 Pairs = list[list[str]]

@@ -1,4 +1,7 @@
-"""rosgraph.names: graph resource names (ROS wiki, Names)."""
+"""rosgraph.names: graph resource names (ROS wiki, Names).
+
+It also has the environment variables of ROS 1, which programs import from `rosgraph.rosenv`.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,41 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from rosz import names
-from rosz.ros1.state import find_option
-from rosz.ros1.tools.rosgraph.rosenv import ROS_NAMESPACE
+
+__all__ = (
+    "ANYTYPE",
+    "GLOBALNS",
+    "MSG_EXT",
+    "PRIV_NAME",
+    "REMAP",
+    "ROS_NAMESPACE",
+    "SEP",
+    "SRV_EXT",
+    "anonymous_name",
+    "canonicalize_name",
+    "get_ros_namespace",
+    "is_global",
+    "is_legal_base_name",
+    "is_legal_name",
+    "is_legal_remap",
+    "is_private",
+    "load_mappings",
+    "make_caller_id",
+    "make_global_ns",
+    "myargv",
+    "namespace",
+    "ns_join",
+    "resolve_name",
+    "script_resolve_name",
+)
+
+ROS_MASTER_URI = "ROS_MASTER_URI"
+ROS_IP = "ROS_IP"
+ROS_IPV6 = "ROS_IPV6"
+ROS_HOSTNAME = "ROS_HOSTNAME"
+ROS_NAMESPACE = "ROS_NAMESPACE"
+DEFAULT_MASTER_PORT = 11311
+DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 
 MSG_EXT = ".msg"
 SRV_EXT = ".srv"
@@ -25,12 +61,42 @@ _BASE = re.compile(r"[A-Za-z]\w*")
 _NAME = re.compile(r"[~/A-Za-z][\w/]*")
 
 
+def find_option(options: str | tuple[str, ...], argv: Sequence[str] | None = None) -> str | None:
+    """Return the value of the first of some options, such as ``__ns:=``, or None."""
+    words = (word for word in (sys.argv if argv is None else argv) if word.startswith(options))
+    first = next(words, None)
+    return None if first is None else first.partition(REMAP)[2]
+
+
+def get_master_uri(
+    env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
+) -> str | None:
+    """Return the URI of the master: ``__master:=``, ``ROS_MASTER_URI`` or ROS 1's default.
+
+    Programs print it; nothing in rosz uses it.
+
+    Args:
+        env: Environment variables; those of the process when not given.
+        argv: Command line; that of the process when not given.
+
+    Raises:
+        ValueError: ``__master:=`` has no value, or more than one.
+    """
+    given = find_option("__master:=", argv)
+    if given is not None:
+        if not given or ":=" in given:
+            raise ValueError(f"expected one URI behind '__master:=', got '{given}'")
+        return given
+    variables = os.environ if env is None else env
+    return variables.get(ROS_MASTER_URI, DEFAULT_MASTER_URI)
+
+
 def get_ros_namespace(
     env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
 ) -> str:
     """Return the namespace of ``__ns:=`` or ``ROS_NAMESPACE``, with slashes at both ends.
 
-    The arguments are those of `rosenv.get_master_uri`.
+    The arguments are those of `get_master_uri`.
     """
     given = find_option("__ns:=", argv)
     variables = os.environ if env is None else env

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Mapping
 from urllib.parse import urlsplit
 
-from rosz.ros1.state import find_option
+from rosz.ros1.tools.rosgraph.names import find_option
 
 _NOWHERE = ("10.255.255.255", 1)
 """No packet is sent there: connecting a UDP socket only chooses the local address."""
