@@ -160,10 +160,11 @@ _BUILT: Mapping[str, str] = {
     "rclpy.utilities": "rclpy.program: get_default_context get_rmw_implementation_identifier ok"
     " remove_ros_args shutdown try_shutdown",
     "rclpy.wait_for_message": "rclpy.program: wait_for_message",
+    "ros2cli": "",
     "ros2cli.node": "",
-    "ros2cli.node.strategy": "ros2cli: NodeStrategy",
+    "ros2cli.node.strategy": "rclpy.program: NodeStrategy",
     "ros2topic": "",
-    "ros2topic.api": "ros2cli: get_topic_names_and_types",
+    "ros2topic.api": "rclpy.program: get_topic_names_and_types",
     "rosidl_runtime_py.convert": "rosidl_runtime_py: message_to_csv message_to_ordereddict"
     " message_to_yaml",
     "rosidl_runtime_py.set_message": "rosidl_runtime_py: set_message_fields",
@@ -281,7 +282,6 @@ MODULES: Mapping[str, Module] = {
     },
     "ament_index_python": Module("ros2.ament_index_python"),
     "rclpy": Module("ros2.rclpy"),
-    "ros2cli": Module("ros2.ros2cli"),
     "rosgraph.impl.graph": Module("ros1.tools.rosgraph.graph"),
     "rosidl_runtime_py": Module("ros2.rosidl_runtime_py"),
     "rospy.exceptions": Module("ros1.exceptions"),

@@ -1,4 +1,7 @@
-"""tf2_geometry_msgs: transformed points, poses, vectors and wrenches (ROS wiki)."""
+"""tf2_geometry_msgs: transformed points, poses, vectors and wrenches (ROS wiki).
+
+Each result is in the frame, and has the stamp, of the TransformStamped that is given.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""rclpy's functions for a whole program, and rclpy.utilities."""
+"""rclpy's functions for a whole program, rclpy.utilities, and ros2cli's for programs."""
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 from enum import IntEnum
@@ -190,3 +191,25 @@ def expand_topic_name(topic_name: str, node_name: str, node_namespace: str) -> s
 def get_rmw_implementation_identifier() -> str:
     """Return the name of the middleware whose wire format rosz uses."""
     return "rmw_zenoh_cpp"
+
+
+class NodeStrategy:
+    """A hidden node of a command, for a ``with`` block; arguments of the command are ignored."""
+
+    def __init__(self, *_args: Any, **_options: Any) -> None:
+        self._context = Context()
+
+    def __enter__(self) -> Node:
+        self._context.init([])
+        return Node(f"_ros2cli_{os.getpid()}", context=self._context)
+
+    def __exit__(self, *_details: object) -> None:
+        self._context.shutdown()
+
+
+def get_topic_names_and_types(
+    *, node: Node, include_hidden_topics: bool = False
+) -> list[tuple[str, list[str]]]:
+    """Return the topics with their types, without those with a part that begins with ``_``."""
+    topics = node.get_topic_names_and_types()
+    return [topic for topic in topics if include_hidden_topics or "/_" not in topic[0]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from network import Network
 
 from rosz.msgs.std_msgs.msg import Int32
-from rosz.ros2.ros2cli import NodeStrategy, get_topic_names_and_types
+from rosz.ros2.rclpy.program import NodeStrategy, get_topic_names_and_types
 
 from .conftest import World
 
