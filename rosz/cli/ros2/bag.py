@@ -33,14 +33,11 @@ def record(given: Namespace) -> int | str:
         return f"[ERROR] [ros2bag]: Output folder '{folder}' already exists."
     split = bool(given.max_bag_size or given.max_bag_duration)
     folder.mkdir(parents=True)
-    left_out = [given.exclude_regex] if given.exclude_regex else []
-    if (everything or given.regex) and not given.hidden:
-        left_out.append(f"(?!.*{_EVENTS}$).*/_.*")
     line = RecordLine(
         topics=[f".*(?:{given.regex}).*"] if given.regex and not everything else topics,
         every=everything,
         regex=bool(given.regex) and not everything,
-        exclude="|".join([*left_out, *given.exclude_topics]),
+        exclude=_left_out(given),
         services=given.all or given.all_services,
         name=str(folder / f"{folder.name}{'' if split else '_0'}.mcap"),
         split=split,
@@ -56,6 +53,14 @@ def record(given: Namespace) -> int | str:
             write_metadata(folder)
         else:
             folder.rmdir()
+
+
+def _left_out(given: Namespace) -> str:
+    """Return an expression of the topics that are not recorded."""
+    patterns = [given.exclude_regex, *given.exclude_topics]
+    if (given.all or given.all_topics or given.regex) and not given.hidden:
+        patterns.append(f"(?!.*{_EVENTS}$).*/_.*")
+    return "|".join(filter(None, patterns))
 
 
 def play(given: Namespace) -> int:
