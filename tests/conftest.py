@@ -67,8 +67,11 @@ _LONG = ("hosts", "faults", "course", "interop", "bridges", "web")
 """Folders with long tests. They begin first, so that no worker has one left at the end."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark tests by what they need, and put long ones first."""
+    # Modules of tests import ROS 1's names; fixtures of modules come before those of functions.
+    config.stash[_ROS1_DEFAULTS] = Ros2Default.ros1
+    Ros2Default.ros1 = False
     for item in items:
         path = item.path.relative_to(_HOSTS.parent)
         folder = path.parts[0]
