@@ -12,6 +12,9 @@ import msgspec
 
 from rosz import names
 
+_ROS_WORDS = frozenset({"--ros-args", "-r", "--remap", "-p", "--param", "--"})
+_ROS_OPTIONS = frozenset({"--params-file", "--log-level"})
+
 
 class Arguments(msgspec.Struct, frozen=True):
     """The command line of a node, sorted by kind; texts are as written.
@@ -62,15 +65,21 @@ def parse(argv: Sequence[str]) -> Arguments:
     params: dict[str, str] = {}
     special: dict[str, str] = {}
     rest: list[str] = []
-    for argument in argv:
+    ros2 = "--ros-args" in argv  # whose parameters of the command line count, and no files
+    for before, argument in zip(("", *argv), argv, strict=False):
         left, separator, right = argument.partition(":=")
         left, right = left.strip(), right.strip()
         if not separator or not left:
-            rest.append(argument)
+            if not ros2 or (
+                {argument, before}.isdisjoint(_ROS_OPTIONS) and argument not in _ROS_WORDS
+            ):
+                rest.append(argument)
         elif not right:
             continue
         elif left.startswith("__"):
-            special[left] = right
+            special["__name" if left == "__node" else left] = right
+        elif ros2 and before in {"-p", "--param"}:
+            params[left] = right
         elif left.startswith("_"):
             params[left[1:]] = right
         else:

@@ -9,8 +9,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlsplit
 
 import msgspec
@@ -215,6 +216,7 @@ class _Launch:
             if own is not None and not any(own.is_relative_to(root) for root in roots):
                 roots = (*roots, own)
         if roots != self.environment.package_roots:
+            os.environ["ROSZ_PACKAGE_PATH"] = os.pathsep.join(map(str, roots))  # for Python files
             self.environment = msgspec.structs.replace(self.environment, package_roots=roots)
             self.packages = package_index(self.environment)
 
@@ -223,9 +225,9 @@ class _Launch:
         return self.arguments.ns or self.environment.namespace
 
     def plan(self) -> Plan:
-        from rosz.launch.plan import plan
-
-        return plan(self.files, self.arguments.args, self.context, ns=self.namespace)
+        reader = reader_of(self.files)
+        plan: Plan = reader.plan(self.files, self.arguments.args, self.context, ns=self.namespace)
+        return plan
 
     def workplace(self) -> Workplace:
         """Return the packages and settings from which the commands of nodes are made."""
@@ -234,12 +236,12 @@ class _Launch:
         return Workplace(self.packages, self.environment, self.environ, str(self.cwd))
 
     def answer(self, question: str, node: str) -> str:
-        from rosz.launch.plan import describe_args
         from rosz.launch.run import report
 
         if question == "ros-args":
-            docs = describe_args(self.files, self.arguments.args, self.context, ns=self.namespace)
-            return report.describe(docs)
+            read = reader_of(self.files).describe_args
+            args = self.arguments.args
+            return report.describe(read(self.files, args, self.context, ns=self.namespace))
         plan = self.plan()
         ns = self.namespace or "/"
         if question == "args":
@@ -292,6 +294,14 @@ class _Launch:
         uri = self.environ["ROS_MASTER_URI"]
         shown = ", ".join([*programs[:_LISTED], *(["..."] if programs[_LISTED:] else [])])
         print_lines([f"nodes not in Python ({shown}) have {whose} ROS 1 master {uri}"])
+
+
+def reader_of(files: Sequence[str | LaunchText]) -> Any:
+    """Return the package that reads launch files into plans: that of ROS 1, or that of ROS 2."""
+    if not any(isinstance(file, str) and file.endswith(".py") for file in files):
+        return import_module("rosz.launch.plan")
+    import_module("rosz.ros1")  # so that the files can import launch
+    return import_module("rosz.ros2.launch")
 
 
 def _find_master(

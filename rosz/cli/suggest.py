@@ -30,7 +30,7 @@ T = TypeVar("T")
 _SHARE = 0.3
 """Share of the time limit of a completion that opening a session, or a reply, may take."""
 _LEAST_SECONDS = 0.01
-_LAUNCH_FILES = ("*.launch", "*.launch.xml")
+_LAUNCH_FILES = ("*.launch", "*.launch.xml", "*launch.py")
 
 
 class Line:
@@ -269,9 +269,11 @@ def launch_words(line: Line) -> list[str]:
     """Return packages and files, then the launch files of the package, then the file's args."""
     before = line.before
     if not before:
-        paths = (path for path in files(line) if path.endswith(("/", ".launch", ".xml")))
+        paths = (
+            path for path in files(line) if path.endswith(("/", ".launch", ".xml", ".launch.py"))
+        )
         return [*packages(line), *paths]
-    if len(before) == 1 and not before[0].endswith((".launch", ".xml")):
+    if len(before) == 1 and not before[0].endswith((".launch", ".xml", ".py")):
         folder = line.packages.find(before[0]).path
         return sorted({file.name for pattern in _LAUNCH_FILES for file in folder.rglob(pattern)})
     defaults = _launch_args(line)

@@ -227,6 +227,35 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         "rosgraph.names": "DEFAULT_MASTER_PORT DEFAULT_MASTER_URI ROS_HOSTNAME ROS_IP ROS_IPV6"
         " ROS_MASTER_URI ROS_NAMESPACE get_master_uri",
     },
+    "launch.action": {"launch": "Action"},
+    "launch.conditions": {
+        "launch.substitutions": "IfCondition LaunchConfigurationEquals"
+        " LaunchConfigurationNotEquals UnlessCondition",
+    },
+    "launch.launch_context": {"launch": "LaunchContext"},
+    "launch.launch_description": {"launch": "LaunchDescription"},
+    "launch.launch_description_sources": {
+        "launch.substitutions": "AnyLaunchDescriptionSource PythonLaunchDescriptionSource",
+    },
+    "launch.logging": {"launch": "get_logger"},
+    "launch.some_substitutions_type": {"launch": "SomeSubstitutionsType"},
+    "launch.substitution": {"launch": "Substitution"},
+    "launch.utilities": {
+        "launch.base": "normalize_to_list_of_substitutions perform_substitutions",
+    },
+    "launch_ros": {},
+    "launch_ros.actions": {
+        "launch.actions": "PushROSNamespace PushRosNamespace SetParameter SetParametersFromFile"
+        " SetRemap SetUseSimTime",
+        "launch.process": "ComposableNodeContainer LifecycleNode=Node LoadComposableNodes Node",
+    },
+    "launch_ros.descriptions": {
+        "launch.process": "ComposableNode Parameter ParameterFile ParameterValue",
+    },
+    "launch_ros.parameter_descriptions": {"launch.process": "ParameterFile ParameterValue"},
+    "launch_ros.substitutions": {
+        "launch.substitutions": "ExecutableInPackage FindPackagePrefix FindPackageShare",
+    },
     "roslaunch.arg_dump": {"roslaunch.node_args": "dump_args get_args"},
     "roslaunch.launch": {"roslaunch.parent": "ROSLaunchRunner", "roslaunch.core": "RLException"},
     "roslaunch.nodeprocess": {"roslaunch.pmon": "LocalProcess=Process"},
@@ -341,6 +370,7 @@ MODULES: Mapping[str, Module] = {
         for name in names.split()
     },
     "ament_index_python": Module("ros2.ament_index_python"),
+    "launch": Module("ros2.launch"),
     "rclpy": Module("ros2.rclpy"),
     "rosgraph.impl.graph": Module("ros1.tools.rosgraph.graph"),
     "rosidl_runtime_py": Module("ros2.rosidl_runtime_py"),

@@ -87,13 +87,14 @@ def _file_of(name: str, file: str | None) -> str:
 
 
 def _show_arguments(file: str) -> None:
-    from rosz.launch.plan import SystemContext, describe_args
+    from rosz.cli.launch import reader_of
+    from rosz.launch.plan import SystemContext
 
     environment = Environment.read()
     packages = package_index(environment)
     context = SystemContext(packages, dict(os.environ), Path.cwd(), lambda base: base)
     lines = ["Arguments (pass arguments as '<name>:=<value>'):"]
-    documents = describe_args([file], {}, context)
+    documents = reader_of([file]).describe_args([file], {}, context)
     for each in documents:
         lines += ["", f"    '{each.name}':", f"        {each.doc or 'no description given'}"]
         if each.default is not None:

@@ -178,6 +178,9 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
         container: Full name of the container that runs it, or "" for a process of its own.
         by_reference: Whether rospy nodes in a container pass on messages, not copies of them.
         members: Nodes that the process runs if it is a container; a container has no package.
+        ros2: Whether a launch file of ROS 2 has it. Then a node takes ROS 2's arguments, its own
+            name if none is given, and has ``command`` if it is in no package.
+        ros_params: Values, and paths of files, that such a node gets as arguments, in order.
         place: Position of the tag.
     """
 
@@ -204,6 +207,8 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
     container: str = ""
     by_reference: bool = False
     members: tuple[NodePlan, ...] = ()
+    ros2: bool = False
+    ros_params: tuple[str | dict[str, Any], ...] = ()
 
     @property
     def full_name(self) -> str:
@@ -227,6 +232,18 @@ class TestPlan(msgspec.Struct, frozen=True):
     test_name: str
     time_limit: float
     retry: int
+
+
+class StepPlan(msgspec.Struct, frozen=True):
+    """What a launch does besides starting processes: it prints a text when it begins.
+
+    Attributes:
+        text: Text to print.
+        place: Position of the action.
+    """
+
+    text: str
+    place: Place
 
 
 class ArgDoc(msgspec.Struct, frozen=True):
@@ -254,6 +271,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         machines: Machines that the files declare.
         nodes: Processes, in order; no full name twice.
         tests: Tests, in order.
+        steps: What else happens when the launch begins, in order.
         unused_args: Names of the args given that no file declares.
         warnings: Warnings, including some that roslaunch does not give.
         deprecations: Texts of ``<launch deprecated="…">``.
@@ -266,6 +284,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     machines: tuple[MachinePlan, ...] = ()
     nodes: tuple[NodePlan, ...] = ()
     tests: tuple[TestPlan, ...] = ()
+    steps: tuple[StepPlan, ...] = ()
     unused_args: tuple[str, ...] = ()
     warnings: tuple[Notice, ...] = ()
     deprecations: tuple[Notice, ...] = ()
@@ -314,6 +333,7 @@ class PlanBuilder:
     Attributes:
         files: Absolute paths of the files read, as keys in order.
         tests: The tests, of which two may have the same name.
+        steps: What the launch does besides starting processes.
         default_machine: Name of the machine for nodes that name none.
     """
 
@@ -330,6 +350,7 @@ class PlanBuilder:
         self._machines: dict[str, MachinePlan] = {}
         self._nodes: dict[str, NodePlan] = {}
         self.tests: list[TestPlan] = []
+        self.steps: list[StepPlan] = []
         self._first_used: dict[MachinePlan, str] = {}
 
     def clear(self, ns: str) -> None:
@@ -440,6 +461,7 @@ class PlanBuilder:
             machines=tuple(self._machines.values()),
             nodes=tuple(nodes),
             tests=tuple(tests),
+            steps=tuple(self.steps),
             unused_args=unused_args,
             warnings=tuple(self.warnings),
             deprecations=tuple(self.deprecations),

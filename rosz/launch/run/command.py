@@ -22,6 +22,7 @@ from rosz.launch.plan import NodePlan
 from rosz.launch.run import report
 from rosz.launch.run.process_tree import TAG
 from rosz.packages import Package, PackageIndex, is_python, start_words
+from rosz.params.yaml import inline
 from rosz.program import ProgramSpec
 from rosz.remap import parse
 
@@ -78,15 +79,16 @@ class Workplace(msgspec.Struct, frozen=True):
         if node.members:
             return self._container(node, environ, log_file)
         direct = bool(node.launch_prefix) and node.output == "screen"
-        if node.command:
+        if node.command and not node.type:
             words = tuple(report.command_line(node, self.find))
+            environ = _with_ros1_names(environ) if node.ros2 else environ
             return NodeCommand(words, words, environ, self._cwd(node.cwd, None), direct=direct)
-        shown = tuple(report.command_line(node, self.find))
-        if log_file is not None:
-            shown = (*shown, f"__log:={log_file}")
+        shown = (*report.command_line(node, self.find), *_ros_params(node))
         prefixed = len(node.launch_prefix)
         program = Path(shown[prefixed])
         python = is_python(program)
+        if log_file is not None and (python or not node.ros2):
+            shown = (*shown, *["-r"] * node.ros2, f"__log:={log_file}")
         if not python:
             environ = _with_ros1_names(environ)
         start = _start(node.launch_prefix, program, python=python)
@@ -163,6 +165,16 @@ class Workplace(msgspec.Struct, frozen=True):
         if choice.lower() in {"", "ros_home"}:
             return str(self.environment.home) if program is not None else self.cwd
         return str(Path(self.cwd, choice))
+
+
+def _ros_params(node: NodePlan) -> list[str]:
+    """Return the arguments for the parameters of a node of ROS 2."""
+    words: list[str] = []
+    for source in node.ros_params:
+        values = source.items() if isinstance(source, dict) else ()
+        words += ["--params-file", source] if isinstance(source, str) else []
+        words += [word for name, value in values for word in ("-p", f"{name}:={inline(value)}")]
+    return words
 
 
 def run_command(

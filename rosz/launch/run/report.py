@@ -90,11 +90,15 @@ def command_line(node: NodePlan, find: Callable[[str, str], str]) -> list[str]:
     Raises:
         NotFoundError: If ``find`` does not find the executable.
     """
-    if node.command:
+    if node.command and not node.type:
         return [*node.launch_prefix, *node.command, *node.args]
     remaps = [f"{old}:={new}" for old, new in node.remaps]
-    program = find(node.package, node.type)
-    return [*node.launch_prefix, program, *node.args, *remaps, f"__name:={node.name}"]
+    words = [*node.launch_prefix, *(node.command or [find(node.package, node.type)]), *node.args]
+    if not node.ros2:
+        return [*words, *remaps, f"__name:={node.name}"]
+    own = [f"__name:={node.name}"] * node.named
+    own += [f"__ns:={node.namespace}"] * (node.namespace != "/")
+    return [*words, "--ros-args", *(word for rule in own + remaps for word in ("-r", rule))]
 
 
 def describe(docs: Iterable[ArgDoc]) -> str:

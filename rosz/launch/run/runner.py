@@ -227,6 +227,8 @@ class Runner:
         self._processes = group_nodes(
             plan.nodes, self._workplace, lambda text: console.error(f"WARNING: {text}")
         )
+        for step in plan.steps:
+            console.say(step.text)
         for notice in (*plan.warnings, *plan.deprecations):
             console.error(f"WARNING: {notice}")
 

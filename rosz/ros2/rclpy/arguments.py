@@ -72,8 +72,8 @@ def parse(args: Sequence[str]) -> RosArguments:
     for option, value in _options(args):
         if option in {"-r", "--remap"}:
             _, name, target = _split(value)
-            if name in {"__node", "__name", "__ns"}:
-                special["__ns" if name == "__ns" else "__name"] = target
+            if name.startswith("__"):
+                special["__name" if name == "__node" else name] = target
             else:
                 remaps[name] = target
         elif option in {"-p", "--param"}:
@@ -99,7 +99,7 @@ def _options(args: Sequence[str]) -> Iterator[tuple[str, str]]:
             inside = word == _BEGIN
         elif word == _END:
             inside = False
-        elif word not in _FLAGS:
+        elif word != _BEGIN and word not in _FLAGS:
             value = next(words, None)
             if value is None:
                 raise UsageError(f"'{word}' is the last argument; expected a value after it")
