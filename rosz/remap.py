@@ -12,8 +12,8 @@ import msgspec
 
 from rosz import names
 
-_ROS_WORDS = frozenset({"--ros-args", "-r", "--remap", "-p", "--param", "--"})
-_ROS_OPTIONS = frozenset({"--params-file", "--log-level"})
+_ROS2_WORDS = frozenset({"--ros-args", "-r", "--remap", "-p", "--param", "--"})
+_ROS2_OPTIONS = frozenset({"--params-file", "--log-level"})
 
 
 class Arguments(msgspec.Struct, frozen=True):
@@ -65,21 +65,20 @@ def parse(argv: Sequence[str]) -> Arguments:
     params: dict[str, str] = {}
     special: dict[str, str] = {}
     rest: list[str] = []
-    ros2 = "--ros-args" in argv  # whose parameters of the command line count, and no files
+    ros2 = "--ros-args" in argv
     for before, argument in zip(("", *argv), argv, strict=False):
+        if ros2 and (argument in _ROS2_WORDS or {before, argument} & _ROS2_OPTIONS):
+            continue  # files of parameters are not read here
         left, separator, right = argument.partition(":=")
         left, right = left.strip(), right.strip()
         if not separator or not left:
-            if not ros2 or (
-                {argument, before}.isdisjoint(_ROS_OPTIONS) and argument not in _ROS_WORDS
-            ):
-                rest.append(argument)
+            rest.append(argument)
         elif not right:
             continue
         elif left.startswith("__"):
             special["__name" if left == "__node" else left] = right
         elif ros2 and before in {"-p", "--param"}:
-            params[left] = right
+            params[left.replace(".", "/")] = right
         elif left.startswith("_"):
             params[left[1:]] = right
         else:

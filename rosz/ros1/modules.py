@@ -232,6 +232,9 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
         "launch.substitutions": "IfCondition LaunchConfigurationEquals"
         " LaunchConfigurationNotEquals UnlessCondition",
     },
+    "launch.event_handlers": {
+        "launch.events": "OnProcessExit OnProcessStart OnShutdown",
+    },
     "launch.launch_context": {"launch": "LaunchContext"},
     "launch.launch_description": {"launch": "LaunchDescription"},
     "launch.launch_description_sources": {
@@ -245,8 +248,8 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
     },
     "launch_ros": {},
     "launch_ros.actions": {
-        "launch.actions": "PushROSNamespace PushRosNamespace SetParameter SetParametersFromFile"
-        " SetRemap SetUseSimTime",
+        "launch.actions": "PushROSNamespace PushRosNamespace ROSTimer RosTimer SetParameter"
+        " SetParametersFromFile SetRemap SetUseSimTime",
         "launch.process": "ComposableNodeContainer LifecycleNode=Node LoadComposableNodes Node",
     },
     "launch_ros.descriptions": {

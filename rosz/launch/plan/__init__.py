@@ -31,6 +31,7 @@ from rosz.launch.plan.model import (
     SetupPlan,
     StepPlan,
     TestPlan,
+    Trigger,
     Wait,
 )
 
@@ -51,6 +52,7 @@ __all__ = (
     "StepPlan",
     "SystemContext",
     "TestPlan",
+    "Trigger",
     "Wait",
     "describe_args",
     "parse_arguments",

@@ -125,6 +125,18 @@ class Wait(msgspec.Struct, frozen=True):
     place: Place
 
 
+class Trigger(msgspec.Struct, frozen=True):
+    """What a process or a step of a launch waits for.
+
+    Attributes:
+        event: ``start`` or ``exit`` of a process.
+        node: Full name of the process, or "" for any.
+    """
+
+    event: Literal["start", "exit"]
+    node: str
+
+
 class MachinePlan(msgspec.Struct, frozen=True):
     """A ``<machine>``.
 
@@ -180,6 +192,7 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
         members: Nodes that the process runs if it is a container; a container has no package.
         ros2: Whether a launch file of ROS 2 has it. Then a node takes ROS 2's arguments, its own
             name if none is given, and has ``command`` if it is in no package.
+        after: Event that it waits for first, or None.
         ros_params: Values, and paths of files, that such a node gets as arguments, in order.
         place: Position of the tag.
     """
@@ -208,6 +221,7 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
     by_reference: bool = False
     members: tuple[NodePlan, ...] = ()
     ros2: bool = False
+    after: Trigger | None = None
     ros_params: tuple[str | dict[str, Any], ...] = ()
 
     @property
@@ -235,15 +249,21 @@ class TestPlan(msgspec.Struct, frozen=True):
 
 
 class StepPlan(msgspec.Struct, frozen=True):
-    """What a launch does besides starting processes: it prints a text when it begins.
+    """What a launch does besides starting processes: it prints a text, and may end.
 
     Attributes:
         text: Text to print.
         place: Position of the action.
+        shutdown: Whether the launch ends.
+        after: Event that it waits for, or None for the begin of the launch.
+        delay: Time in seconds that passes then.
     """
 
     text: str
     place: Place
+    shutdown: bool = False
+    after: Trigger | None = None
+    delay: float = 0.0
 
 
 class ArgDoc(msgspec.Struct, frozen=True):
@@ -271,7 +291,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         machines: Machines that the files declare.
         nodes: Processes, in order; no full name twice.
         tests: Tests, in order.
-        steps: What else happens when the launch begins, in order.
+        steps: What else the launch does, in order.
         unused_args: Names of the args given that no file declares.
         warnings: Warnings, including some that roslaunch does not give.
         deprecations: Texts of ``<launch deprecated="…">``.

@@ -227,8 +227,6 @@ class Runner:
         self._processes = group_nodes(
             plan.nodes, self._workplace, lambda text: console.error(f"WARNING: {text}")
         )
-        for step in plan.steps:
-            console.say(step.text)
         for notice in (*plan.warnings, *plan.deprecations):
             console.error(f"WARNING: {notice}")
 
@@ -267,6 +265,7 @@ class Runner:
             hosts,
             self._loop,
             self._console,
+            steps=self._plan.steps,
             timeouts=self._options.timeouts,
             holds=self._network.holds,
             stay=self._options.stay or (alone and not self._plan.nodes),

@@ -14,7 +14,7 @@ from enum import Enum
 from functools import partial
 
 from rosz.errors import LaunchError, NotFoundError, RoszError, near_miss
-from rosz.launch.plan import Condition, NodePlan, Wait
+from rosz.launch.plan import Condition, NodePlan, StepPlan, Trigger, Wait
 from rosz.launch.run.console import Console
 from rosz.launch.run.host import Host
 from rosz.launch.run.loop import Loop, LoopTimer
@@ -58,6 +58,7 @@ class LaunchProcess:
         ended: Time of the latest end, by the loop's clock.
         killed: Whether it did not end in time and was killed.
         alive: Whether the latest process itself still runs.
+        waits: Whether the event that it waits for has not come yet.
     """
 
     def __init__(self, node: NodePlan, number: int, host: Host, supervisor: Supervisor) -> None:
@@ -76,6 +77,7 @@ class LaunchProcess:
         self.ended = 0.0
         self.killed = False
         self.alive = False
+        self.waits = node.after is not None
         self._supervisor = supervisor
         self._loop = supervisor.loop
         self._timers: list[LoopTimer] = []
@@ -86,10 +88,11 @@ class LaunchProcess:
     @property
     def over(self) -> bool:
         """Whether nothing of it runs, and nothing will unless requested."""
-        return self.state in {ProcessState.ENDED, ProcessState.FAILED}
+        return self.waits or self.state in {ProcessState.ENDED, ProcessState.FAILED}
 
     def begin(self) -> None:
         """Wait for the conditions of the node, then start it."""
+        self.waits = False
         self.state = ProcessState.WAITING
         self._wait(self.node.wait_for)
 
@@ -277,6 +280,7 @@ class Supervisor:
         host_of: Function that returns the machine of a node; it may raise `LaunchError`.
         loop: Loop that waits; it is stopped when the launch is over.
         holds: Function that returns whether a condition of ``wait_for`` is true.
+        steps: What else the launch does.
         stay: Whether the launch continues when nothing runs any more.
 
     Attributes:
@@ -295,9 +299,12 @@ class Supervisor:
         *,
         timeouts: Timeouts,
         holds: Callable[[Condition], bool],
+        steps: Sequence[StepPlan] = (),
         stay: bool = False,
     ) -> None:
         self.loop = loop
+        self._steps = steps
+        self._waiting: list[tuple[Trigger, Callable[[], object]]] = []
         self.timeouts = timeouts
         self.holds = holds
         self._stay = stay
@@ -322,11 +329,30 @@ class Supervisor:
 
     def start(self) -> None:
         """Start all processes, each as soon as its conditions are true."""
-        for process in self.processes:
-            if not self.closing:
-                process.begin()
+        actions: list[tuple[Trigger | None, Callable[[], object]]] = [
+            *((step.after, partial(self._take, step, step.delay)) for step in self._steps),
+            *((process.node.after, process.begin) for process in self.processes),
+        ]
+        self._waiting = [(after, action) for after, action in actions if after is not None]
+        for after, action in actions:
+            if after is None and not self.closing:
+                action()
         self._begun = True
         self._end_when_over()
+
+    def _happened(self, *events: Trigger) -> None:
+        happened = [each for each in self._waiting if each[0] in events]
+        self._waiting = [each for each in self._waiting if each not in happened]
+        for _, action in happened:
+            action()
+
+    def _take(self, step: StepPlan, delay: float = 0.0) -> None:
+        if delay > 0:
+            self.loop.later(delay, partial(self._take, step))
+        elif not self.closing:
+            self.console.say(step.text or f"{step.place}: shutdown")
+            if step.shutdown:
+                self.shutdown()
 
     def add(self, node: NodePlan) -> LaunchProcess:
         """Start a further process, and return it; only on the loop's thread."""
@@ -414,6 +440,7 @@ class Supervisor:
                 f"process[{process.label}]: started with pid [{process.child.pid}]{where}"
             )
             self.console.note(f"process[{process.label}]: {process.child.shown}")
+        self._happened(Trigger("start", process.node.full_name), Trigger("start", ""))
         self._call_back(process)
 
     def failed_to_start(self, process: LaunchProcess, error: RoszError) -> None:
@@ -447,6 +474,8 @@ class Supervisor:
             self.console.error(f"[{process.label}] {text}")
         else:
             self.console.strong(f"[{process.label}] {text}")
+        if not self.closing:
+            self._happened(Trigger("exit", process.node.full_name), Trigger("exit", ""))
 
     @staticmethod
     def _describe_death(process: LaunchProcess) -> str:

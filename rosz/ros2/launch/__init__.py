@@ -6,7 +6,7 @@
 from logging import getLogger as get_logger  # noqa: N813  # launch's
 from typing import Any as SomeSubstitutionsType
 
-from rosz.ros2.launch import actions, substitutions
+from rosz.ros2.launch import actions, events, substitutions
 from rosz.ros2.launch.base import Action, LaunchContext, LaunchDescription, Substitution
 from rosz.ros2.launch.base import Action as LaunchDescriptionEntity
 from rosz.ros2.launch.base import Part as Condition

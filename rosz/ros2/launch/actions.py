@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from rosz.launch.plan import ArgDoc, StepPlan
+from rosz.launch.plan import ArgDoc
 from rosz.ros2.launch.base import Action, LaunchContext, SubstitutionFailure, make, visit_all
+from rosz.ros2.launch.events import add_step, delay, shut_down
 from rosz.ros2.launch.process import ExecuteProcess, evaluate, join
 from rosz.ros2.launch.source import IncludeLaunchDescription
 
@@ -68,38 +69,36 @@ def _add(context: LaunchContext, setting: str, value: Any) -> None:
     context.launch_configurations[setting] = (*before, value)
 
 
-def _set(context: LaunchContext, name: Any, value: Any) -> None:
-    context.launch_configurations[context.text(name)] = context.text(value)
-
-
-def _set_variable(context: LaunchContext, name: Any, value: Any) -> None:
-    context.environment[context.text(name)] = context.text(value)
-
-
 def _set_parameter(context: LaunchContext, name: Any, value: Any) -> None:
     _add(context, "global_params", {context.text(name): evaluate(context, value)})
-
-
-def _log(context: LaunchContext, msg: Any) -> None:
-    context.builder.steps.append(StepPlan(context.text(msg), context.place))
 
 
 _ACTIONS: dict[str, Any] = {
     "AppendEnvironmentVariable": _extend,
     "DeclareLaunchArgument": _declare,
     "GroupAction": _group,
-    "LogInfo": _log,
+    "EmitEvent": lambda context, event: event.function(context),
+    "LogInfo": add_step,
     "OpaqueFunction": lambda context, function, args=(), kwargs=None: function(
         context, *(args or ()), **(kwargs or {})
     ),
     "PushROSNamespace": _push,
     "PushRosNamespace": _push,
-    "SetEnvironmentVariable": _set_variable,
-    "SetLaunchConfiguration": _set,
+    "ROSTimer": delay,
+    "RegisterEventHandler": lambda context, event_handler, **_: event_handler.function(context),
+    "RosTimer": delay,
+    "SetEnvironmentVariable": lambda context, name, value: context.environment.update(
+        {context.text(name): context.text(value)}
+    ),
+    "SetLaunchConfiguration": lambda context, name, value: context.launch_configurations.update(
+        {context.text(name): context.text(value)}
+    ),
     "SetParameter": _set_parameter,
     "SetParametersFromFile": lambda context, filename: _add(context, "global_params", filename),
     "SetRemap": lambda context, src, dst: _add(context, "ros_remaps", (src, dst)),
     "SetUseSimTime": lambda context, value: _set_parameter(context, "use_sim_time", value),
+    "Shutdown": shut_down,
+    "TimerAction": delay,
 }
 _NAMES = (*_ACTIONS, "ExecuteProcess", "IncludeLaunchDescription")
 globals().update(make(__name__, Action, _ACTIONS), __all__=_NAMES)

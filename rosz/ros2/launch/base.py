@@ -22,8 +22,7 @@ from msgspec.structs import replace
 
 from rosz.environment import Environment, package_index
 from rosz.errors import LaunchError, LaunchFileError, RoszError
-from rosz.launch.plan import ArgDoc, Notice, Place, PlanBuilder, SystemContext
-from rosz.launch.plan import LaunchContext as LaunchSystem
+from rosz.launch.plan import ArgDoc, Notice, Place, PlanBuilder, SystemContext, Trigger
 from rosz.launch.plan.substitution import parse_bool
 
 _ROSZ = str(Path(__file__).parents[2])
@@ -38,24 +37,29 @@ class LaunchContext:
     """The state of a launch while its files are read.
 
     Attributes:
-        launch_configurations: Values of arguments and other settings by name.
         environment: Environment variables of the processes that follow.
-        builder: The plan so far.
         files: Launch files that are being read, the innermost last.
         docs: Arguments that the files declare, by name.
         place: Position of the action that is being executed.
+        timing: Event, and time in seconds after it, that what is added waits for.
     """
 
-    def __init__(self, *, system: LaunchSystem | None = None, **_: Any) -> None:
+    def __init__(
+        self, args: Mapping[str, str] | None = None, ns: str = "", *, system: Any = None, **_: Any
+    ) -> None:
         packages = package_index(Environment.read())
-        self.system: LaunchSystem = system or SystemContext(packages, os.environ, Path.cwd(), str)
+        self.system = system or SystemContext(packages, os.environ, Path.cwd(), str)
         self.builder = PlanBuilder(self.system)
-        self.launch_configurations: dict[str, Any] = {}
+        self.launch_configurations: dict[str, Any] = dict(args or {})
+        if ns:
+            self.launch_configurations["ros_namespace"] = f"/{ns.strip('/')}"
         self.environment: dict[str, str] = dict(self.system.environ)
         self.files: list[str] = []
         self.docs: dict[str, ArgDoc] = {}
         self.includes: tuple[str, ...] = ()
         self.place = Place("")
+        self.handlers: list[Any] = []
+        self.timing: tuple[Trigger | None, float] = (None, 0.0)
 
     def text(self, subs: Any) -> str:
         """Return the text of a substitution, of a text, or of several in a row."""

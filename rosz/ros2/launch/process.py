@@ -12,6 +12,7 @@ from typing import Any, get_args
 from rosz import names
 from rosz.errors import ParamError, YamlError, near_miss
 from rosz.launch.plan import NodePlan
+from rosz.launch.plan.substitution import substitute
 from rosz.params.ros2_file import assign, nest
 from rosz.params.yaml import read_plain
 from rosz.ros2.launch.base import (
@@ -22,9 +23,10 @@ from rosz.ros2.launch.base import (
     SubstitutionFailure,
     make,
 )
+from rosz.ros2.launch.events import handle
 
 _PROCESS = (
-    "additional_env cached_output cmd cwd emulate_tty env log_cmd name output output_format"
+    "additional_env cached_output cmd cwd emulate_tty env log_cmd name on_exit output output_format"
     " prefix respawn respawn_delay respawn_max_retries shell sigkill_timeout sigterm_timeout"
 )
 _NODE = "arguments exec_name executable namespace package parameters remappings ros_arguments"
@@ -32,11 +34,7 @@ _TYPES: tuple[Any, ...] = (bool, int, float, str, bytes)
 
 
 class ExecuteProcess(Action):
-    """Start a program.
-
-    Attributes:
-        plan: The process in the plan, once the action is executed.
-    """
+    """Start a program; ``plan`` is the process in the plan, once the action is executed."""
 
     takes = frozenset(_PROCESS.split())
     needs = "cmd"
@@ -69,19 +67,21 @@ class ExecuteProcess(Action):
             return shlex.split(context.text(value))
         return [context.text(word) for word in value or ()]
 
-    def _add(self, context: LaunchContext, **fields: Any) -> NodePlan:
+    def _add(self, context: LaunchContext, **fields: Any) -> None:
         """Add a process with the options that nodes and other programs have."""
         options, before = self._options, context.system.environ
         env = {key: value for key, value in context.environment.items() if before.get(key) != value}
-        for key, value in [
-            pair for name in ("env", "additional_env") for pair in (options.get(name) or {}).items()
-        ]:
-            env[context.text(key)] = context.text(value)
+        given = {**(options.get("env") or {}), **(options.get("additional_env") or {})}
+        env |= {context.text(key): context.text(value) for key, value in given.items()}
         output, most = options.get("output", "log"), options.get("respawn_max_retries", -1)
         shown = isinstance(output, Mapping) or context.text(output) in {"screen", "both", "full"}
         delay = options.get("respawn_delay") or 0.0
+        if options.get("on_exit") is not None:
+            handle(context, "exit", self, options["on_exit"])
         self.plan = NodePlan(
             **fields,
+            after=context.timing[0],
+            spawn_delay=context.timing[1],
             place=context.place,
             ros2=True,
             launch_prefix=tuple(self._words(context, "prefix")),
@@ -93,7 +93,6 @@ class ExecuteProcess(Action):
             env=tuple(env.items()),
         )
         context.builder.add_node(self.plan)
-        return self.plan
 
 
 class Node(ExecuteProcess):
@@ -112,34 +111,25 @@ class Node(ExecuteProcess):
         own = self._options.get("parameters") or ()
         if not isinstance(own, list | tuple):
             raise SubstitutionFailure(f"{type(self).__name__} takes a list of parameters")
-        given = [*settings.get("global_params", ()), *own]
-        sources = [_read_source(context, each) for each in given]
-        plan = self._add(
+        base = names.check_base(name or context.builder.unused_name(ns, _valid(program)))
+        sources: list[Any] = []
+        for each in (*settings.get("global_params", ()), *own):
+            source, parts = _read_source(context, each, names.join(ns, base))
+            sources += [source] if source else []
+            for below, values in parts:
+                context.builder.add_params(below, values, context.place)
+        self._add(
             context,
             package=package,
             type=program,
             command=() if package else (program,),
-            name=names.check_base(name or context.builder.unused_name(ns, _valid(program))),
+            name=base,
             named=bool(name),
             namespace=ns,
             args=(*self._words(context, "arguments"), *["--ros-args"] * bool(ros_args), *ros_args),
             remaps=tuple((context.text(old), context.text(new)) for old, new in remaps),
-            ros_params=tuple(source for source in sources if source),
+            ros_params=tuple(sources),
         )
-        for source in plan.ros_params:
-            parts = [(plan.full_name, nest(source))] if isinstance(source, dict) else []
-            if isinstance(source, str):
-                tree = next(read_plain(context.system.read(source).decode(), source), None) or {}
-                try:
-                    parts = assign(tree, plan.full_name)
-                except ParamError as error:
-                    context.warn(f"{source}: {error}")
-            for node, values in parts:
-                context.builder.add_params(node, values, plan.place)
-
-
-def _refuse(context: LaunchContext, *_: Any, **__: Any) -> None:  # noqa: ARG001  # an action's
-    raise SubstitutionFailure("rosz does not load components, which are compiled; start nodes")
 
 
 def join(ns: str, name: str) -> str:
@@ -153,25 +143,28 @@ def _valid(program: str) -> str:
     return name if re.match("[A-Za-z]", name) else f"process_{name}"
 
 
-def _read_source(context: LaunchContext, given: Any) -> Any:
-    """Return the path or the values that an item of ``parameters`` stands for."""
+def _read_source(context: LaunchContext, given: Any, node: str) -> tuple[Any, list[Any]]:
+    """Return an item of ``parameters`` as a path or values, and those below a node's name."""
+    if isinstance(given, _Value):  # with a name
+        given = {given.name: given}
     if isinstance(given, Mapping):
-        return _flatten(context, given)
-    made = isinstance(given, Part) and not isinstance(given, Substitution)
-    return given.function(context) if made else _check_file(context, given)
-
-
-def _check_file(context: LaunchContext, param_file: Any, *, allow_substs: Any = False) -> str:
-    """Return the path of a file of parameters, or "" if it cannot be read."""
-    path = str(Path(context.system.cwd, context.text(param_file)))
+        values = _flatten(context, given)
+        return values, [(node, nest(values))]
+    path = str(Path(context.system.cwd, context.text(getattr(given, "param_file", given))))
     try:
-        data = context.system.read(path)
-    except OSError as error:
-        context.warn(f"parameter file '{path}' is left out: {error.strerror}")
-        return ""
-    if context.is_true(allow_substs) and b"$(" in data:
-        raise SubstitutionFailure(f"'{path}' has substitutions, which rosz does not apply")
-    return path
+        written = context.system.read(path).decode()
+        substituted = "$(" in written and context.is_true(getattr(given, "allow_substs", False))
+        if substituted:
+            settings = context.launch_configurations.items()
+            texts = {name: value for name, value in settings if isinstance(value, str)}
+            written = substitute(written, context.system, texts, {}, path)
+        parts = assign(next(read_plain(written, path), None) or {}, node)
+    except (OSError, ParamError) as error:
+        context.warn(f"parameter file '{path}' is left out: {error}")
+        return "", []
+    if not substituted:
+        return path, parts
+    return {key: each for _, tree in parts for key, each in _flatten(context, tree).items()}, parts
 
 
 def _flatten(context: LaunchContext, tree: Mapping[Any, Any], prefix: str = "") -> dict[str, Any]:
@@ -189,15 +182,9 @@ def _flatten(context: LaunchContext, tree: Mapping[Any, Any], prefix: str = "") 
 
 
 def evaluate(context: LaunchContext, value: Any, value_type: Any = None, **_: Any) -> Any:
-    """Return the value of a parameter; the text of substitutions is read as YAML.
-
-    Args:
-        context: The state of the launch.
-        value: The value as the launch file has it.
-        value_type: Type that the value has to have, such as ``str`` or ``List[int]``.
-    """
+    """Return the value of a parameter; the text of substitutions is read as YAML."""
     if isinstance(value, _Value):
-        return value.function(context)
+        return evaluate(context, value.value, getattr(value, "value_type", None))
     parts = value if isinstance(value, list | tuple) else [value]
     substituted = any(isinstance(part, Substitution) for part in parts)
     if all(isinstance(part, str | Substitution) for part in parts) and (
@@ -231,19 +218,25 @@ def _check(value: Any, value_type: Any) -> Any:
 
 
 class _Value(Part):
-    """The value of a parameter, with its type."""
+    """The value of a parameter, or a whole parameter with its name."""
+
+    name: Any
+    value: Any
 
 
-_SOURCES: dict[str, Any] = {
-    "Parameter": lambda context, name, value, **options: {
-        context.text(name): evaluate(context, value, **options)
-    },
-    "ParameterFile": _check_file,
-}
+def _refuse(context: LaunchContext, *_: Any, **__: Any) -> None:  # noqa: ARG001  # an action's
+    raise SubstitutionFailure("rosz does not load components, which are compiled; start nodes")
+
+
+# Of those that only hold their arguments, the functions return these.
 _COMPONENTS = dict.fromkeys(("ComposableNodeContainer", "LoadComposableNodes"), _refuse)
-globals().update(
-    make(__name__, Action, _COMPONENTS) | make(__name__, Part, {"ComposableNode": _refuse})
-)
-globals().update(
-    make(__name__, Part, _SOURCES) | make(__name__, _Value, {"ParameterValue": evaluate})
-)
+_FILES: dict[str, Any] = {
+    "ComposableNode": _refuse,
+    "ParameterFile": lambda _, param_file, *, allow_substs=False: (param_file, allow_substs),
+}
+_VALUES: dict[str, Any] = {
+    "Parameter": lambda _, name, value, *, value_type=None: (name, value, value_type),
+    "ParameterValue": evaluate,
+}
+globals().update(make(__name__, Action, _COMPONENTS) | make(__name__, Part, _FILES))
+globals().update(make(__name__, _Value, _VALUES))

@@ -13,6 +13,7 @@ from rosz.errors import LaunchError, LaunchFileError, near_miss
 from rosz.launch.plan import ArgDoc, Notice, Place, Plan
 from rosz.launch.plan import LaunchContext as LaunchSystem
 from rosz.ros2.launch.base import Action, LaunchContext, LaunchDescription, refusing, visit_all
+from rosz.ros2.launch.events import execute_handlers
 
 _MAX_INCLUDES = 50
 """Maximum depth of includes, which is far within the limit of Python's recursion."""
@@ -22,19 +23,15 @@ _MODULE = "python_launch_file"
 def plan(
     files: Sequence[str], args: Mapping[str, str], system: LaunchSystem, *, ns: str = ""
 ) -> Plan:
-    """Read launch files of ROS 2 into a plan; the arguments are those of `rosz.launch.plan.plan`.
-
-    Raises:
-        LaunchFileError: A file cannot be read, or fails; the error has the place in the file.
-    """
-    context = _begin(args, system, ns)
+    """Read launch files of ROS 2 into a plan, as `rosz.launch.plan.plan` does with ROS 1's."""
+    context = LaunchContext(args, ns, system=system)
     for file in files:
         with refusing(Place(file), ()):
             visit_all(context, _load(context, file))
+            execute_handlers(context)
     unused = tuple(name for name in args if name not in context.docs)
     for name in unused:
-        hint = near_miss(name, context.docs)
-        reason = f"no file declares an argument '{name}', so '{name}:=…' may do nothing{hint}"
+        reason = f"no file declares '{name}', so it may do nothing{near_miss(name, context.docs)}"
         context.builder.warnings.append(Notice(reason, Place("<command line>")))
     return context.builder.build(unused)
 
@@ -42,25 +39,13 @@ def plan(
 def describe_args(
     files: Sequence[str], args: Mapping[str, str], system: LaunchSystem, *, ns: str = ""
 ) -> tuple[ArgDoc, ...]:
-    """Return the arguments that launch files of ROS 2 declare, as far as they can be executed.
-
-    Raises:
-        LaunchFileError: A file cannot be read, or fails before it describes the launch.
-    """
-    context = _begin(args, system, ns)
+    """Return the arguments that launch files declare, as far as the files can be executed."""
+    context = LaunchContext(args, ns, system=system)
     for file in files:
         for entity in _load(context, file).entities:
             with suppress(LaunchFileError):  # of what needs an argument that is not given
                 visit_all(context, entity)
     return tuple(context.docs.values())
-
-
-def _begin(args: Mapping[str, str], system: LaunchSystem, ns: str) -> LaunchContext:
-    context = LaunchContext(system=system)
-    context.launch_configurations.update(args)
-    if ns:
-        context.launch_configurations["ros_namespace"] = f"/{ns.strip('/')}"
-    return context
 
 
 def _load(context: LaunchContext, path: str) -> LaunchDescription:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shlex
 import shutil
 from contextlib import suppress
@@ -81,10 +80,6 @@ def _prefix(context: LaunchContext, package: Any) -> Path:
     return folder.parent.parent if folder.parent.name == "share" else folder
 
 
-def _join(context: LaunchContext, substitutions: Any) -> str:
-    return os.path.join(*(context.text(part) for part in substitutions))  # noqa: PTH118  # text
-
-
 def _has_value(context: LaunchContext, name: Any, expected_value: Any) -> bool:
     expected = None if expected_value is None else context.text(expected_value)
     return bool(context.launch_configurations.get(context.text(name)) == expected)
@@ -92,28 +87,22 @@ def _has_value(context: LaunchContext, name: Any, expected_value: Any) -> bool:
 
 _SUBSTITUTIONS: dict[str, Any] = {
     "AnyLaunchDescriptionSource": LaunchContext.text,
-    "AndSubstitution": lambda context, left, right: (
-        context.is_true(left) and context.is_true(right)
-    ),
+    "AndSubstitution": lambda context, *args: all(map(context.is_true, args)),
     "Command": _output,
     "EnvironmentVariable": _variable,
     "EqualsSubstitution": _equal,
     "ExecutableInPackage": _executable,
-    "FileContent": lambda context, path: context.system.read(context.text(path)).decode(),
     "FindExecutable": lambda context, name: _program(context, context.text(name)),
     "FindPackagePrefix": _prefix,
     "FindPackageShare": lambda context, package: context.system.find(context.text(package)),
-    "IfElseSubstitution": lambda context, condition, if_value="", else_value="": context.text(
-        if_value if context.is_true(condition) else else_value
-    ),
     "LaunchConfiguration": _configuration,
     "NotEqualsSubstitution": lambda context, left, right: not _equal(context, left, right),
     "NotSubstitution": lambda context, value: not context.is_true(value),
-    "OrSubstitution": lambda context, left, right: context.is_true(left) or context.is_true(right),
-    "PathJoinSubstitution": _join,
+    "OrSubstitution": lambda context, *args: any(map(context.is_true, args)),
+    "PathJoinSubstitution": lambda context, substitutions: Path(*map(context.text, substitutions)),
     "PathSubstitution": LaunchContext.text,
-    "PythonLaunchDescriptionSource": LaunchContext.text,
     "PythonExpression": _expression,
+    "PythonLaunchDescriptionSource": LaunchContext.text,
     "TextSubstitution": lambda _, text: text,
     "ThisLaunchFile": lambda context: context.files[-1],
     "ThisLaunchFileDir": lambda context: Path(context.files[-1]).parent,
@@ -121,9 +110,7 @@ _SUBSTITUTIONS: dict[str, Any] = {
 _CONDITIONS: dict[str, Any] = {
     "IfCondition": LaunchContext.is_true,
     "LaunchConfigurationEquals": _has_value,
-    "LaunchConfigurationNotEquals": lambda context, name, value: (
-        not _has_value(context, name, value)
-    ),
+    "LaunchConfigurationNotEquals": lambda context, *args: not _has_value(context, *args),
     "UnlessCondition": lambda context, value: not context.is_true(value),
 }
 globals().update(make(__name__, Substitution, _SUBSTITUTIONS) | make(__name__, Part, _CONDITIONS))

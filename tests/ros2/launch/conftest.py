@@ -21,7 +21,7 @@ from launch.conditions import *
 from launch.substitutions import *
 from launch.launch_description_sources import *
 from launch_ros.actions import *
-from launch_ros.parameter_descriptions import *
+from launch_ros.descriptions import *
 from launch_ros.substitutions import *
 
 def generate_launch_description():
@@ -54,19 +54,20 @@ class Folder:
 
         return plan([file], args, self.context(**(environ or {})), ns=ns)
 
-    def plan(self, entities: str, **options: Any) -> Plan:
+    def plan(self, entities: str, *, head: str = "", **options: Any) -> Plan:
         """Return the plan of a file with these entities."""
-        return self.read(self.write("x.launch.py", f"{HEAD}{entities}\n    ])\n"), **options)
+        text = f"{head}{HEAD}{entities}\n    ])\n"
+        return self.read(self.write("x.launch.py", text), **options)
 
     def node(self, entities: str, **options: Any) -> NodePlan:
         (node,) = self.plan(entities, **options).nodes
         return node
 
-    def error(self, entities: str, **options: Any) -> str:
+    def error(self, entities: str, *, head: str = "", **options: Any) -> str:
         """Return the error of a file with these entities; lines count from the first of them."""
         with pytest.raises(LaunchFileError) as caught:
-            self.plan(entities, **options)
-        line = caught.value.line - HEAD.count("\n")
+            self.plan(entities, head=head, **options)
+        line = caught.value.line - (head + HEAD).count("\n")
         assert caught.value.path == str(self.path / "x.launch.py")
         return f"{line}: {caught.value.plain_reason}"
 

@@ -101,7 +101,16 @@ def test_parameters_come_from_all_sources_in_order(folder: Folder) -> None:
         "/n/b/c": 2,
         "/n/deep/er": "x",
     }
-    assert "absent.yaml' is left out: No such file" in plan.warnings[0].text
+    assert "absent.yaml' is left out: [Errno 2] No such file" in plan.warnings[0].text
+
+
+def test_files_of_parameters_may_have_substitutions(folder: Folder) -> None:
+    folder.write("p.yaml", "/**: {ros__parameters: {a: $(find-pkg-share robot), b.c: $(var x)}}\n")
+    parameters = "[ParameterFile('p.yaml', allow_substs=True), Parameter('d', 'e')]"
+    node = folder.node(
+        f"Node(package='robot', executable='a', name='n', parameters={parameters})", x="7"
+    )
+    assert node.ros_params == ({"a": str(folder.path), "b.c": 7}, {"d": "e"})
 
 
 def test_arguments_have_defaults_values_and_choices(folder: Folder) -> None:
@@ -167,8 +176,6 @@ def test_conditions(folder: Folder, condition: str, holds: bool) -> None:
         ("FindPackagePrefix('robot')", "FOLDER"),
         ("PathSubstitution('a') / 'b'", "a/b"),
         ("Command(['echo ', 'hi'])", "hi\n"),
-        ("IfElseSubstitution('1', if_value='yes', else_value='no')", "yes"),
-        ("FileContent('package.xml')", "<package><name>robot</name></package>"),
         ("FindExecutable(name='sh')", "/bin/sh"),
     ],
 )
