@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 app = App()
 
+_ROS1 = rb"<node\b[^>]*\stype=|\$\((arg|find|optenv)\s|<(machine|rosparam|test)\b|\swait_for="
+_ROS2 = rb"<(node|executable)\b[^>]*\s(exec|cmd)=|\$\((var|find-pkg-share)\s"
 _QUESTIONS = ("nodes", "args", "find_node", "files", "ros_args", "dump_params", "dump_plan")
 _REQUESTS = ("status", "restart", "stop", "output")
 _LISTED = 8
@@ -298,10 +301,18 @@ class _Launch:
 
 def reader_of(files: Sequence[str | LaunchText]) -> Any:
     """Return the package that reads launch files into plans: that of ROS 1, or that of ROS 2."""
-    if not any(isinstance(file, str) and file.endswith(".py") for file in files):
+    if not any(isinstance(file, str) and _is_ros2(file) for file in files):
         return import_module("rosz.launch.plan")
     import_module("rosz.ros1")  # so that the files can import launch
     return import_module("rosz.ros2.launch")
+
+
+def _is_ros2(file: str) -> bool:
+    """Return whether a launch file is of ROS 2 by its name, or if in XML by its content."""
+    if not file.endswith("launch.xml"):
+        return file.endswith((".py", ".yaml", ".yml"))
+    text = Path(file).read_bytes()
+    return re.search(_ROS2, text) is not None and re.search(_ROS1, text) is None
 
 
 def _find_master(
@@ -403,7 +414,7 @@ def _hint(name: str, packages: PackageIndex) -> str:
     if Path("launch", name).is_file():
         return f"; did you mean 'launch/{name}'?"
     if name in packages.names():
-        own = sorted({file.name for file in packages.find(name).path.rglob("*.launch")})
+        own = sorted({file.name for file in packages.find(name).path.rglob("*.launch*")})
         if not own:
             return f"; '{name}' is a package, and has no launch files"
         which = f", such as {', '.join(own[:_LISTED])}"

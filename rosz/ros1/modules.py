@@ -238,7 +238,14 @@ _BUILT: Mapping[str, Mapping[str, str]] = {
     "launch.launch_context": {"launch": "LaunchContext"},
     "launch.launch_description": {"launch": "LaunchDescription"},
     "launch.launch_description_sources": {
-        "launch.substitutions": "AnyLaunchDescriptionSource PythonLaunchDescriptionSource",
+        "launch.substitutions": "AnyLaunchDescriptionSource FrontendLaunchDescriptionSource"
+        " PythonLaunchDescriptionSource",
+    },
+    "launch_xml": {},
+    "launch_xml.launch_description_sources": {"launch.substitutions": "XMLLaunchDescriptionSource"},
+    "launch_yaml": {},
+    "launch_yaml.launch_description_sources": {
+        "launch.substitutions": "YAMLLaunchDescriptionSource",
     },
     "launch.logging": {"launch": "get_logger"},
     "launch.some_substitutions_type": {"launch": "SomeSubstitutionsType"},

@@ -17,6 +17,7 @@ from rosz.launch.plan.context import (
     SystemContext,
     parse_arguments,
 )
+from rosz.launch.plan.document import Document, Element, parse
 from rosz.launch.plan.loader import describe_args, plan
 from rosz.launch.plan.model import (
     ArgDoc,
@@ -38,6 +39,8 @@ from rosz.launch.plan.model import (
 __all__ = (
     "ArgDoc",
     "Condition",
+    "Document",
+    "Element",
     "LaunchArguments",
     "LaunchContext",
     "LaunchText",
@@ -55,6 +58,7 @@ __all__ = (
     "Trigger",
     "Wait",
     "describe_args",
+    "parse",
     "parse_arguments",
     "plan",
 )

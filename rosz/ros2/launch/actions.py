@@ -5,11 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from rosz.errors import LaunchError
 from rosz.launch.plan import ArgDoc
 from rosz.ros2.launch.base import Action, LaunchContext, SubstitutionFailure, make, visit_all
 from rosz.ros2.launch.events import add_step, delay, shut_down
 from rosz.ros2.launch.process import ExecuteProcess, evaluate, join
-from rosz.ros2.launch.source import IncludeLaunchDescription
+
+_MAX_INCLUDES = 50
+"""Maximum depth of includes, which is far within the limit of Python's recursion."""
+
+
+class IncludeLaunchDescription(Action):
+    """Execute another launch file with some arguments."""
+
+    def __init__(
+        self, launch_description_source: Any, *, launch_arguments: Any = None, condition: Any = None
+    ) -> None:
+        super().__init__(condition=condition)
+        self.launch_description_source = launch_description_source
+        self.launch_arguments: tuple[Any, ...] = tuple(launch_arguments or ())
+
+    def execute(self, context: LaunchContext) -> None:
+        """Set the arguments, and execute the file."""
+        path = context.text(self.launch_description_source)
+        for name, value in self.launch_arguments:
+            context.launch_configurations[context.text(name)] = context.text(value)
+        includes, files = context.includes, context.files
+        if len(includes) >= _MAX_INCLUDES:
+            raise LaunchError(f"includes nest deeper than {_MAX_INCLUDES}, at '{path}'")
+        context.includes, context.files = (*includes, str(self.place)), [*files]
+        try:
+            visit_all(context, context.load(path))
+        finally:
+            context.includes, context.files = includes, files
 
 
 def _declare(

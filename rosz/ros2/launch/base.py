@@ -38,6 +38,7 @@ class LaunchContext:
 
     Attributes:
         environment: Environment variables of the processes that follow.
+        load: Function that returns the description of a file, which becomes the innermost one.
         files: Launch files that are being read, the innermost last.
         docs: Arguments that the files declare, by name.
         place: Position of the action that is being executed.
@@ -55,6 +56,7 @@ class LaunchContext:
             self.launch_configurations["ros_namespace"] = f"/{ns.strip('/')}"
         self.environment: dict[str, str] = dict(self.system.environ)
         self.files: list[str] = []
+        self.load: Any = None
         self.docs: dict[str, ArgDoc] = {}
         self.includes: tuple[str, ...] = ()
         self.place = Place("")

@@ -6,17 +6,16 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from types import ModuleType
-from typing import Any
 
 from rosz.errors import LaunchError, LaunchFileError, near_miss
 from rosz.launch.plan import ArgDoc, Notice, Place, Plan
 from rosz.launch.plan import LaunchContext as LaunchSystem
-from rosz.ros2.launch.base import Action, LaunchContext, LaunchDescription, refusing, visit_all
+from rosz.ros2.launch.base import LaunchContext, LaunchDescription, refusing, visit_all
 from rosz.ros2.launch.events import execute_handlers
+from rosz.ros2.launch.frontend import read
 
-_MAX_INCLUDES = 50
-"""Maximum depth of includes, which is far within the limit of Python's recursion."""
 _MODULE = "python_launch_file"
 
 
@@ -25,6 +24,7 @@ def plan(
 ) -> Plan:
     """Read launch files of ROS 2 into a plan, as `rosz.launch.plan.plan` does with ROS 1's."""
     context = LaunchContext(args, ns, system=system)
+    context.load = partial(_load, context)
     for file in files:
         with refusing(Place(file), ()):
             visit_all(context, _load(context, file))
@@ -41,6 +41,7 @@ def describe_args(
 ) -> tuple[ArgDoc, ...]:
     """Return the arguments that launch files declare, as far as the files can be executed."""
     context = LaunchContext(args, ns, system=system)
+    context.load = partial(_load, context)
     for file in files:
         for entity in _load(context, file).entities:
             with suppress(LaunchFileError):  # of what needs an argument that is not given
@@ -59,7 +60,7 @@ def _load(context: LaunchContext, path: str) -> LaunchDescription:
             raise LaunchError(f"the launch file cannot be read: {error.strerror}") from error
         context.builder.files.setdefault(absolute)
         if not path.endswith(".py"):
-            raise LaunchError("the file is not in Python; expected a name that ends in .py")
+            return read(path, data)
         module = ModuleType(_MODULE)
         module.__file__ = absolute
         sys.modules[_MODULE] = module  # where dataclasses look for the module of a class
@@ -70,28 +71,3 @@ def _load(context: LaunchContext, path: str) -> LaunchDescription:
                 "expected generate_launch_description() to return a LaunchDescription"
             )
         return description
-
-
-class IncludeLaunchDescription(Action):
-    """Execute another launch file with some arguments."""
-
-    def __init__(
-        self, launch_description_source: Any, *, launch_arguments: Any = None, condition: Any = None
-    ) -> None:
-        super().__init__(condition=condition)
-        self.launch_description_source = launch_description_source
-        self.launch_arguments: tuple[Any, ...] = tuple(launch_arguments or ())
-
-    def execute(self, context: LaunchContext) -> None:
-        """Set the arguments, and execute the file."""
-        path = context.text(self.launch_description_source)
-        for name, value in self.launch_arguments:
-            context.launch_configurations[context.text(name)] = context.text(value)
-        includes, files = context.includes, context.files
-        if len(includes) >= _MAX_INCLUDES:
-            raise LaunchError(f"includes nest deeper than {_MAX_INCLUDES}, at '{path}'")
-        context.includes, context.files = (*includes, str(self.place)), [*files]
-        try:
-            visit_all(context, _load(context, path))
-        finally:
-            context.includes, context.files = includes, files

@@ -32,7 +32,7 @@ def _configuration(context: LaunchContext, variable_name: Any, default: Any = No
     return context.text(str(value) if isinstance(value, bool | int | float) else value)
 
 
-def _variable(context: LaunchContext, name: Any, *, default_value: Any = None) -> str:
+def _variable(context: LaunchContext, name: Any, default_value: Any = None) -> str:
     value = context.environment.get(context.text(name), default_value)
     if value is None:
         raise SubstitutionFailure(f"environment variable '{context.text(name)}' is not set")
@@ -92,9 +92,11 @@ _SUBSTITUTIONS: dict[str, Any] = {
     "EnvironmentVariable": _variable,
     "EqualsSubstitution": _equal,
     "ExecutableInPackage": _executable,
+    "FileContent": lambda context, path: context.system.read(context.text(path)).decode(),
     "FindExecutable": lambda context, name: _program(context, context.text(name)),
     "FindPackagePrefix": _prefix,
     "FindPackageShare": lambda context, package: context.system.find(context.text(package)),
+    "FrontendLaunchDescriptionSource": LaunchContext.text,
     "LaunchConfiguration": _configuration,
     "NotEqualsSubstitution": lambda context, left, right: not _equal(context, left, right),
     "NotSubstitution": lambda context, value: not context.is_true(value),
@@ -103,6 +105,8 @@ _SUBSTITUTIONS: dict[str, Any] = {
     "PathSubstitution": LaunchContext.text,
     "PythonExpression": _expression,
     "PythonLaunchDescriptionSource": LaunchContext.text,
+    "XMLLaunchDescriptionSource": LaunchContext.text,
+    "YAMLLaunchDescriptionSource": LaunchContext.text,
     "TextSubstitution": lambda _, text: text,
     "ThisLaunchFile": lambda context: context.files[-1],
     "ThisLaunchFileDir": lambda context: Path(context.files[-1]).parent,
