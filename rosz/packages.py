@@ -37,6 +37,8 @@ SYSTEM = Path("/usr/share")
 """Where Debian has its packages, side by side with those that are none of ROS."""
 # Linux looks for the interpreter in as many bytes of a script (BINPRM_BUF_SIZE).
 _SHEBANG_BYTES = 256
+_MAX_TEXT = 10_000
+"""Characters of a value in a setup.py that others may repeat."""
 _COMMENT = re.compile(r"#.*")
 _INSTALLED = re.compile(
     r"\bcatkin_install_python\s*\(\s*PROGRAMS\b(.*?)\bDESTINATION\b", re.DOTALL | re.IGNORECASE
@@ -139,35 +141,10 @@ class Package(msgspec.Struct, frozen=True):
             source = (self.path / "setup.py").read_bytes()
         except OSError:
             return {}
-        import ast  # slow to load, and rarely needed
-
         try:
-            tree = ast.parse(source)
-        except (SyntaxError, ValueError):  # 'rosz pkg check' reports it
+            return _console_scripts(source)
+        except (SyntaxError, ValueError, RecursionError):  # 'rosz pkg check' reports it
             return {}
-        names: dict[str, str] = {}
-
-        def text_of(node: ast.AST) -> str:
-            """Return the text of an expression with ``+`` and f-strings; lists have lines."""
-            if isinstance(node, ast.Constant | ast.Name):
-                return names.get(node.id, "") if isinstance(node, ast.Name) else str(node.value)
-            glue = "\n" if isinstance(node, ast.List | ast.Tuple) else ""
-            return glue.join(map(text_of, ast.iter_child_nodes(node)))
-
-        for node in tree.body:
-            if isinstance(node, ast.Assign):
-                names[ast.unparse(node.targets[0])] = text_of(node.value)
-        listed = [
-            text
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Dict)
-            for key, value in zip(node.keys, node.values, strict=True)
-            if isinstance(key, ast.Constant) and key.value == "console_scripts"
-            for text in text_of(value).split("\n")
-            if "=" in text
-        ]
-        pairs = (text.partition("=") for text in listed)
-        return {name.strip(): entry.strip() for name, _, entry in pairs}
 
     def _module_of(self, name: str, entry: str) -> Path:
         """Return the path of an entry point, with its function."""
@@ -218,6 +195,42 @@ class Package(msgspec.Struct, frozen=True):
         raise NotFoundError(
             f"package '{self.name}' ({self.path}) has no file '{name}'{near_miss(name, kin)}"
         )
+
+
+def _console_scripts(source: bytes) -> dict[str, str]:
+    """Return the console scripts in the text of a setup.py.
+
+    Raises:
+        SyntaxError: It is not Python.
+        ValueError: It has a null byte.
+        RecursionError: An expression is nested too deep.
+    """
+    import ast  # slow to load, and rarely needed
+
+    names: dict[str, str] = {}
+
+    def text_of(node: ast.AST) -> str:
+        """Return the text of an expression with ``+`` and f-strings; lists have lines."""
+        if isinstance(node, ast.Constant | ast.Name):
+            return names.get(node.id, "") if isinstance(node, ast.Name) else str(node.value)
+        glue = "\n" if isinstance(node, ast.List | ast.Tuple) else ""
+        return glue.join(map(text_of, ast.iter_child_nodes(node)))
+
+    tree = ast.parse(source)
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            names[ast.unparse(node.targets[0])] = text_of(node.value)[:_MAX_TEXT]
+    listed = [
+        text
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Dict)
+        for key, value in zip(node.keys, node.values, strict=True)
+        if isinstance(key, ast.Constant) and key.value == "console_scripts"
+        for text in text_of(value).split("\n")
+        if "=" in text
+    ]
+    pairs = (text.partition("=") for text in listed)
+    return {name.strip(): entry.strip() for name, _, entry in pairs}
 
 
 class PackageIndex:

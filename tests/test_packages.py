@@ -70,6 +70,27 @@ def test_entry_points_as_expressions(tmp_path: Path) -> None:
     assert package.executable("a") == folder / "demo/a.py:run"
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n".join(
+            ["a = 'x'", *["a = a + a"] * 60, "setup(e={'console_scripts': [a, 'b=c:main']})"]
+        ),
+        f"setup(e={{'console_scripts': ['a=b:main' + {' + '.join(['x'] * 5000)}]}})",
+        f"a = {'(' * 150}1{')' * 150}",
+        "a = 1\0",
+    ],
+    ids=["doubled", "deep", "brackets", "null"],
+)
+def test_a_hostile_setup_py(tmp_path: Path, text: str) -> None:
+    """It names what it can, within bounds."""
+    folder = make(tmp_path / "p", "demo")
+    (folder / "c.py").touch()
+    (folder / "setup.py").write_text(text)
+    (package,) = PackageIndex([tmp_path]).packages()
+    assert package.executables() in ([], ["b"])
+
+
 def test_ignored_folders(tmp_path: Path) -> None:
     make(tmp_path / "a", "alpha")
     (tmp_path / "a" / "CATKIN_IGNORE").touch()
