@@ -38,7 +38,7 @@ SYSTEM = Path("/usr/share")
 # Linux looks for the interpreter in as many bytes of a script (BINPRM_BUF_SIZE).
 _SHEBANG_BYTES = 256
 _MAX_TEXT = 10_000
-"""Characters of a value in a setup.py that others may repeat."""
+"""Length in characters of the text of a variable in a setup.py; expressions may repeat it."""
 _COMMENT = re.compile(r"#.*")
 _INSTALLED = re.compile(
     r"\bcatkin_install_python\s*\(\s*PROGRAMS\b(.*?)\bDESTINATION\b", re.DOTALL | re.IGNORECASE

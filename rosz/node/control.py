@@ -197,7 +197,7 @@ def _is_newer(node: NodeCore, namesakes: Followed, other: ProcessToken) -> bool:
                 return lead > 0
         if replies:
             break
-        # Queries reach a node a while after its token arrives, and no longer when it ends.
+        # A node responds only some time after its token arrives, and not after its end.
         with suppress(WaitTimeout):
             namesakes.wait_for(lambda view: other not in view.processes(), _PAUSE, "its end")
             return False

@@ -21,7 +21,7 @@ from rosz.node import Node, serve_loggers
 
 _RIGID = frozenset({"fixed", "floating", "planar"})
 _STATE = ("position", "velocity", "effort")
-"""The parts of the state of a joint, in messages and here."""
+"""Parts of the state of a joint: attributes of the joint, and fields of JointState."""
 
 
 class DescriptionError(RoszError):

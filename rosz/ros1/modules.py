@@ -90,7 +90,7 @@ _BUILT: Mapping[str, str] = {
     " extract_params get_tree group_dict in_groups initial_config",
     "dynamic_reconfigure.exceptions": "dynamic_reconfigure: DynamicReconfigureCallbackException"
     " DynamicReconfigureException DynamicReconfigureParameterException",
-    # The second part loads it.
+    # The second part only loads roslib.
     "dynamic_reconfigure.parameter_generator": "dynamic_reconfigure.parameter_generator_catkin:"
     " ParameterGenerator Template bool_t double_t inspect int_t os re str_t sys; roslib:;"
     " rosz.ros1.tools: roslib",
@@ -346,7 +346,7 @@ for _home, _names in (
     ("rclpy.qos", "QoSProfile"),
 ):
     _RCLPY_NAMES |= dict.fromkeys(_names.split(), _home)
-"""Names that each module of rclpy has: editors import them from a module that imports them."""
+"""Names to import from any module of rclpy: editors import them from modules that use them."""
 
 
 def home_of(name: str) -> str:

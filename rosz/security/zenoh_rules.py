@@ -95,7 +95,7 @@ def _grants(permit: Permit) -> Iterator[_Grant]:
     if permit.set:
         yield from _setting(permit.set, reads=permit.get)
     if permit.control:
-        # A newer process with the name of a node ends the older one, which asks it for its age.
+        # A newer node ends an older one of the same name, which asks it for its age.
         yield "ingress", _TOKEN, [f"{_OWN}/node/**"]
         yield "egress", _ASK, [f"{_OWN}/control/**"]
         yield "ingress", _ANSWER, [f"{_OWN}/control/**"]

@@ -384,7 +384,7 @@ class Buffer:
         return known()
 
     def when(self, known: Callable[[], bool], act: Callable[[], object]) -> Callable[[], object]:
-        """Call a function whenever a transform is added, and now, if a condition is met.
+        """Call a function if a condition is met, now and whenever a transform is added.
 
         Returns:
             A function that ends this.

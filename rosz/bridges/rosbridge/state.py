@@ -176,13 +176,13 @@ class Served(Generic[S]):
         self._servers: dict[str, S] = {}
 
     def _check(self, name: str) -> None:
-        """Check that the client may serve a name, and one more; raise a RoszError if not."""
+        """Raise a RoszError if the client may not serve the name, or serves too many names."""
         self._state.shared.policy.check("serve", name)
         if name not in self._servers:
             self._state.shared.limits.check("services", len(self._servers))
 
     def _withdraw(self, operation: Operation, name: str) -> None:
-        """Serve a name no longer, as an operation says."""
+        """Stop serving the name of an operation."""
         full_name = self._node.resolve(name)
         if not self._end_server(full_name):
             text = f"{operation.__struct_config__.tag}: '{full_name}' is not served"

@@ -1,4 +1,4 @@
-"""rclpy's functions for a whole program, rclpy.utilities, and ros2cli's for programs."""
+"""rclpy's functions for a whole program, rclpy.utilities, and what programs use of ros2cli."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class DrivePage:
             self._fault = ui.label("").classes("text-negative")
 
     def close(self) -> None:
-        """Give no picture any more."""
+        """Remove the picture."""
         self._system.pictures.remove(self._picture)
 
     def _list(self) -> None:

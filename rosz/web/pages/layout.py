@@ -232,10 +232,10 @@ class Frame:
 
 
 class Opened(Generic[T]):
-    """At most one thing that a page has open; another takes its place, and it ends with the page.
+    """At most one open resource of a page; it is closed with the page, or when another replaces it.
 
     Attributes:
-        value: What is open; None for nothing.
+        value: The open resource, or None.
     """
 
     def __init__(self, frame: Frame) -> None:
@@ -243,12 +243,12 @@ class Opened(Generic[T]):
         frame.keep(self)
 
     def set(self, value: T) -> None:
-        """Close what is open, and keep another."""
+        """Close the open resource, and hold another."""
         self.close()
         self.value = value
 
     def close(self) -> None:
-        """Close what is open."""
+        """Close the open resource; a second call has no effect."""
         value, self.value = self.value, None
         if value is not None:
             value.close()

@@ -57,7 +57,14 @@ DRAWN_TYPES = frozenset(_DRAW)
 
 
 class SceneSources(NamedTuple):
-    """What displays draw: the messages that a node receives, by frames, and meshes."""
+    """Sources of the drawings of displays.
+
+    Attributes:
+        node: Node that subscribes to the topics.
+        survey: The running nodes.
+        frames: Frames between which positions are transformed.
+        meshes: Meshes that drawings refer to.
+    """
 
     node: Node
     survey: Survey
