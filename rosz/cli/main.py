@@ -131,7 +131,7 @@ def _dispatch(argv: list[str]) -> int:
         return 0 if argv else 2
     name, *words = argv
     if name in {"-V", "--version", "version"}:
-        sys.stdout.write(f"rosz {_version()}\n")
+        sys.stdout.write(f"{_versions()}\n")
         return 0
     if name == "complete":
         from rosz.cli.complete import complete
@@ -177,13 +177,16 @@ def _invoke(app: App, argv: list[str], program: str) -> int:
     return 2 if alone else code or 0
 
 
-def _version() -> str:
+def _versions() -> str:
+    """Return the versions of rosz and of what it runs on, as a report of a fault needs them."""
+    import platform
     from importlib.metadata import PackageNotFoundError, version
 
     try:
-        return version("rosz")
+        own = version("rosz")
     except PackageNotFoundError:
-        return "of unknown version: it is not installed, but runs from its sources"
+        own = "of unknown version: it is not installed, but runs from its sources"
+    return f"rosz {own}, Zenoh {version('eclipse-zenoh')}, Python {platform.python_version()}"
 
 
 def _fail(what: object, code: int) -> int:

@@ -10,7 +10,6 @@ __all__ = ("ALONE", "AMONG_NODES")
 ALONE = {
     "usage": """\
 
---version
 nothing
 topi list
 topic lst
