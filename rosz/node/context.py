@@ -294,6 +294,9 @@ class Context(Closing):
         self._forget_end()
         self._making = threading.RLock()
 
+    def pause_main_thread(self) -> None:
+        """Wait while the main thread must not run, in its signal handler; here there is no need."""
+
     def wait_for_shutdown(self, timeout: float | None = None) -> bool:
         """Wait until the end has begun; any number of threads may.
 

@@ -1,7 +1,8 @@
 """Ctrl-C and SIGTERM: the first shuts contexts down, the second ends the process at once.
 
 A program that asks whether it is shut down, or waits in a function of rosz, ends by itself. One
-that never does, such as a loop around ``time.sleep``, is interrupted by an exception.
+that never does, such as a loop around ``time.sleep``, is interrupted by an exception, but not one
+of rospy.
 
 Python runs a signal handler in the main thread between two bytecodes. A signal that comes right
 before that thread begins to wait is not handled until the wait ends. So a thread is notified too,
@@ -107,6 +108,8 @@ class _Handler:
             context.reason = context.reason or signal.Signals(number).name
         if not self._is_watching():
             self._react(number)
+        for context in contexts:
+            context.pause_main_thread()
         if not any(context.cooperative for context in contexts):
             if number == signal.SIGINT:
                 raise KeyboardInterrupt

@@ -113,6 +113,7 @@ def separate_states() -> None:
 class _Context(Context):
     """A context that runs rospy's shutdown hooks first, while everything still works.
 
+    As in rospy, a signal begins the shutdown and raises nothing: a program ends when it sees that.
     Messages that its nodes receive have tuples for sequences of numbers.
     """
 
@@ -126,6 +127,11 @@ class _Context(Context):
         """Run rospy's hooks, then shut down; shutting down again is not an error."""
         run_hooks(reason or self.reason or "atexit")
         super().shutdown(reason)
+
+    def pause_main_thread(self) -> None:
+        """Let the hooks run alone, as in rospy, where they run in the signal handler."""
+        state.lifecycle.wait_closing(_READY_SECONDS)
+        run_hooks(self.reason)
 
 
 def run_hooks(reason: str) -> None:
@@ -189,6 +195,7 @@ def context() -> Context:
         if state.context is None:
             opened = _Context()
             opened.arguments = arguments()
+            opened.cooperative = True
             state.context = opened
         return state.context
 
@@ -302,15 +309,6 @@ def params_of(name: str) -> Params:
 def is_shutdown() -> bool:
     """Return whether the node is shut down."""
     return state.is_shutdown or (state.context is not None and state.context.is_shutdown)
-
-
-def cooperate() -> None:
-    """Record that the program checks for the shutdown, so Ctrl-C need not raise an exception.
-
-    A check made by a shutdown hook does not count.
-    """
-    if state.context is not None and not state.lifecycle.closing:
-        state.context.cooperative = True
 
 
 def when_ready(act: Callable[[Node], object]) -> None:

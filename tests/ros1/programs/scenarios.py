@@ -172,6 +172,12 @@ SCENARIOS = (
     _interrupted("interrupt_waits", "service"),
     _interrupted("interrupt_waits", "service_timeout"),
     _interrupted("interrupt_busy", waits=False),
+    _interrupted("interrupt_unaware", "busy", waits=False),
+    _interrupted("interrupt_unaware", "sleep", waits=False),
+    _interrupted(
+        "interrupt_unaware", "sleep", waits=False, number=signal.SIGTERM, name="terminate_unaware"
+    ),
+    _interrupted("interrupt_unaware", "server"),
     _interrupted("interrupt_service"),
     _interrupted("interrupt_disabled"),
     _interrupted("interrupt_disabled", "shutdown"),

@@ -40,8 +40,7 @@ from rosz.ros1.exceptions import (
     ROSSerializationException,
 )
 from rosz.ros1.modules import attribute
-from rosz.ros1.state import cooperate, has_node, node_uri, run_hooks, state
-from rosz.ros1.state import is_shutdown as node_is_shutdown
+from rosz.ros1.state import has_node, is_shutdown, node_uri, run_hooks, state
 from rosz.session import clamp_timeout
 from rosz.time import DurationValue
 
@@ -105,7 +104,7 @@ SLICE = 0.5
 SHUT_DOWN = "rospy shutdown"
 """Text of the error of a wait that a shutdown ends."""
 
-_HOOKS_TAKE = 2.0
+_HOOKS_TAKE = 10.0
 """Seconds that a signal handler of the program waits for the shutdown."""
 
 atexit.register(run_hooks, "atexit")
@@ -115,12 +114,6 @@ atexit.register(run_hooks, "atexit")
 
 
 is_initialized = has_node
-
-
-def is_shutdown() -> bool:
-    """Return whether the node is shut down."""
-    cooperate()
-    return node_is_shutdown()
 
 
 is_shutdown_requested = is_shutdown
@@ -166,7 +159,7 @@ def _add_hook(stage: str, hook: Callable[..., object], *late: str) -> None:
             f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}"
         )
     with state.lock:
-        if not node_is_shutdown():
+        if not is_shutdown():
             state.hooks[stage].append(hook)
             return
     hook(*late)
@@ -237,7 +230,7 @@ _missing = attribute("rospy.core", sys.modules[__name__], {})
 
 def __getattr__(name: str) -> Any:
     """Return rospy's variable for the shutdown, which programs read."""
-    return node_is_shutdown() if name == "_in_shutdown" else _missing(name)
+    return is_shutdown() if name == "_in_shutdown" else _missing(name)
 
 
 # The environment.

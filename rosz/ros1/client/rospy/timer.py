@@ -10,7 +10,7 @@ from typing import Any
 from rosz.errors import TimeMovedBackwards
 from rosz.ros1.client.rospy import rostime
 from rosz.ros1.exceptions import ROSInterruptException, ROSTimeMovedBackwardsException
-from rosz.ros1.state import clock, cooperate, is_shutdown, state
+from rosz.ros1.state import clock, is_shutdown, state
 from rosz.time import DurationValue, TimeValue
 
 __all__ = ("Rate", "Timer", "TimerEvent", "sleep")
@@ -47,7 +47,6 @@ def sleep(duration: float | DurationValue) -> None:
     elif is_shutdown():
         _finish_sleep(seconds)
     else:
-        cooperate()
         began = time.monotonic()
         try:
             slept = clock().sleep(round(seconds * _SECOND))
