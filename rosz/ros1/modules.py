@@ -42,7 +42,7 @@ _TOOLS = (
 _LIBRARIES = (
     "PyKDL bondpy camera_info_manager cv_bridge diagnostic_updater"
     " image_geometry interactive_markers laser_geometry ros_numpy"
-    " rosserial_python smach smach_ros tf2_kdl tf_conversions"
+    " resource_retriever rosserial_python smach smach_ros tf2_kdl tf_conversions"
 )
 _NUMPY = {"numpy": "numpy"}
 _VISION = {"cv2": "vision", "numpy": "vision"}

@@ -68,6 +68,14 @@ def _limit(name: str) -> Any:
     return property(get, put)
 
 
+def _setter(name: str) -> Callable[[Bond, Any], None]:
+    def put(self: Bond, dur: Any) -> None:
+        setattr(self, name, dur)
+
+    put.__doc__ = f"Set ``{name}``, before the bond has started."
+    return put
+
+
 class Bond:
     """A bond with another process.
 
@@ -94,6 +102,10 @@ class Bond:
     heartbeat_timeout = _limit("heartbeat_timeout")
     disconnect_timeout = _limit("disconnect_timeout")
     heartbeat_period = _limit("heartbeat_period")
+    set_connect_timeout = _setter("connect_timeout")
+    set_heartbeat_timeout = _setter("heartbeat_timeout")
+    set_disconnect_timeout = _setter("disconnect_timeout")
+    set_heartbeat_period = _setter("heartbeat_period")
 
     def __init__(
         self,

@@ -80,6 +80,7 @@ SCENARIOS = (
     _alone("names_own_argv", "__name:=outer"),
     _alone("init_twice"),
     _alone("init_not_yet"),
+    _alone("early_entities"),
     _alone("params_basic"),
     _alone("params_errors"),
     _alone("params_search", "__ns:=/a/b"),

@@ -185,6 +185,16 @@ def nop_cb(goal_handle: Any) -> None:
     """Do nothing with a goal."""
 
 
+class _LaterNode:
+    """The node of the process before ``init_node``."""
+
+    context = property(lambda _: state.context())
+    resolve = staticmethod(rospy.resolve_name)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(state.node(), name)
+
+
 class ActionServer(actions.ActionlibServer):
     """Receive goals, and publish their states, feedback and results.
 
@@ -203,7 +213,7 @@ class ActionServer(actions.ActionlibServer):
         started: Whether the server receives goals.
 
     Raises:
-        ROSInitException: ``rospy.init_node`` was not called.
+        ROSInitException: It is to start, and ``rospy.init_node`` was not called.
         ActionException: The class is not that of an action.
     """
 
@@ -217,7 +227,7 @@ class ActionServer(actions.ActionlibServer):
         cancel_cb: Callable[[Any], object] = nop_cb,
         auto_start: bool = True,
     ) -> None:
-        node = state.node()
+        node: Any = state.state.node or _LaterNode()
         super().__init__(node, names.canonical(ns), ActionSpec, goal_cb, cancel_cb)
         queue_size = int(rospy.get_param("actionlib_server_pub_queue_size", _QUEUE_SIZE))
         self.queue_size = _QUEUE_SIZE if queue_size < 0 else queue_size

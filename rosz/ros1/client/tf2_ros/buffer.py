@@ -134,10 +134,23 @@ class _Broadcaster:
     _kind: type[Any]
 
     def __init__(self, node: Any = None) -> None:
-        self._broadcaster = self._kind(node_of(node))
+        self._broadcaster: Any = None
+        if node is None:
+            state.when_ready(self._open)
+        else:
+            self._open(node_of(node))
+
+    def _open(self, node: Node) -> None:
+        self._broadcaster = self._kind(node)
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802  # ROS 1's
-        """Publish one TransformStamped or several."""
+        """Publish one TransformStamped or several.
+
+        Raises:
+            ROSInitException: ``rospy.init_node`` was not called.
+        """
+        if self._broadcaster is None:
+            self._open(state.node())
         self._broadcaster.send(transform)
 
 
