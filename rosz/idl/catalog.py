@@ -22,7 +22,7 @@ from rosz.idl.spec import (
 )
 
 _NEXT_DEFINITION = re.compile(r"^=+[ \t]*\r?\nMSG:[ \t]*(\S+)[ \t]*\r?\n", re.MULTILINE)
-_DASHES = re.compile(r"^[ \t]*---[ \t\r]*(?:\n|\Z)", re.MULTILINE)
+_DASHES = re.compile(r"^---.*(?:\n|\Z)", re.MULTILINE)
 _PARTS = ("Goal", "Result", "Feedback")
 _ENVELOPES = {
     "ActionGoal": "Header header\nactionlib_msgs/GoalID goal_id\n{name}Goal goal\n",

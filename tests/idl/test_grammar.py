@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from rosz.errors import DefinitionError
 from rosz.idl import Constant, Field, FieldType, parse_action, parse_message, parse_service
+from rosz.idl.catalog import action_messages
 
 from .definitions import INTERFACES
 from .malformed import ACTIONS, MESSAGES, SERVICES
@@ -126,6 +127,16 @@ def test_a_whole_message() -> None:
 def test_empty_message() -> None:
     assert parse_message("pkg/msg/Good", "").fields == ()
     assert parse_message("pkg/msg/Good", "\n# nothing\n").fields == ()
+
+
+def test_messages_of_an_action_of_ros1() -> None:
+    """Separators only begin with dashes, as in ROS 1."""
+    parts = action_messages("Go", "int32 a\n----- result\nint32 b\n---#\nint32 c")
+    assert [parts[name] for name in ("GoGoal", "GoResult", "GoFeedback")] == [
+        "int32 a\n",
+        "int32 b\n",
+        "int32 c",
+    ]
 
 
 def test_service_and_action_parts() -> None:

@@ -59,7 +59,7 @@ from dynamic_reconfigure.parameter_generator_catkin import *
 
 gen = ParameterGenerator()
 modes = [gen.const(name, str_t, name.lower(), "Mode " + name) for name in ("Fast", "Slow")]
-rates = gen.enum([gen.const("Half", double_t, 0.5, "50"), gen.const("Full", double_t, 1, "100")],
+rates = gen.enum([gen.const("Half", double_t, 0.5, "50"), gen.const("2xHalf", double_t, 1, "100")],
                  "Rates")
 gen.const("Alone", bool_t, True, "Of no enumeration")
 gen.add("mode", str_t, 1, "Größe", "slow", edit_method=gen.enum(modes, "Modes"))

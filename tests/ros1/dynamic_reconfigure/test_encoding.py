@@ -180,6 +180,6 @@ def test_a_module_has_what_catkin_gives_it(ours: dict[str, Any]) -> None:
     assert isinstance(module, ModuleType)
     assert module.__name__ == "sample.cfg.EnumsConfig"
     assert (module.__file__ or "").endswith("Enums.cfg")
-    assert (module.Enums_Fast, module.Enums_Full, module.Enums_Alone) == ("fast", 1.0, True)
+    assert (module.Enums_Fast, module.Enums_2xHalf, module.Enums_Alone) == ("fast", 1.0, True)
     assert module.inf == float("inf")
     assert module.extract_params(module.config_description)[0]["name"] == "mode"

@@ -207,13 +207,14 @@ class ParameterGenerator:
             descr: Meaning, as shown to users.
 
         Raises:
-            ParamError: The name is not legal, or the value does not fit the type.
+            ParamError: The value does not fit the type.
         """
         kind = _kind(name, type)
+        legal = name if name.isidentifier() else "constant"  # as in ROS 1, any text may be a name
         constant = {
             "name": name,
             "type": kind,
-            "value": Setting(name, value, kind=kind).default,
+            "value": Setting(legal, value, kind=kind).default,
             **_place(),
             "description": descr,
             **_c_types(kind),
