@@ -11,7 +11,7 @@ from rosz.cli.call import Call, new_group
 from rosz.cli.console import print_error, print_json, print_lines, print_result, until_stopped
 from rosz.cli.declare import Argument, Json, Option, at_least
 from rosz.errors import NotFoundError, RoszError, UsageError, near_miss
-from rosz.names import short_type
+from rosz.names import ros1_type
 
 if TYPE_CHECKING:
     from rosz.introspect import Survey
@@ -98,7 +98,11 @@ def _info_row(session: Session, survey: Survey, node: Token, *, quiet: bool) -> 
     }
     for kind, title in kinds.items():
         row[title] = [
-            {"name": token.name, "type": short_type(token.type_name), "hash": token.type_hash}
+            {
+                "name": token.name,
+                "type": ros1_type(token.name, token.type_name),
+                "hash": token.type_hash,
+            }
             for token in survey.view.entities(kind)
             if (token.zid, token.node_id) == (node.zid, node.node_id)
         ]

@@ -14,7 +14,7 @@ import msgspec
 
 from rosz.errors import NotFoundError, RoszError, WaitTimeout, near_miss
 from rosz.introspect.survey import Survey, take_survey
-from rosz.names import is_of_action, short_type
+from rosz.names import is_of_action, ros1_type
 from rosz.wire import Kind, Token, tokens_key
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def format_node(survey: Survey, node: Token) -> str:
     """
     lines = [_RULE, f"Node [{node.node_name}]"]
     for title, kind in (("Publications", Kind.PUBLISHER), ("Subscriptions", Kind.SUBSCRIPTION)):
-        topics = {(t.name, short_type(t.type_name)) for t in _entities(survey, node, kind)}
+        topics = {(t.name, ros1_type(t.name, t.type_name)) for t in _entities(survey, node, kind)}
         lines += _section(title, [f"{name} [{type_name}]" for name, type_name in sorted(topics)])
     served = {t.name for t in _entities(survey, node, Kind.SERVICE)}
     lines += _section("Services", sorted(served))

@@ -8,7 +8,7 @@ import msgspec
 
 from rosz.errors import NotFoundError, near_miss
 from rosz.introspect.survey import Survey
-from rosz.names import is_of_action, short_type
+from rosz.names import is_of_action, ros1_type, short_type
 from rosz.wire import Kind, Token
 
 
@@ -40,7 +40,7 @@ def list_topics(tokens: Iterable[Token]) -> list[Topic]:
         if token.kind not in {Kind.PUBLISHER, Kind.SUBSCRIPTION} or is_of_action(token.name):
             continue
         types, publishers, subscribers = topics.setdefault(token.name, (set(), [], []))
-        types.add(short_type(token.type_name))
+        types.add(ros1_type(token.name, token.type_name))
         side = publishers if token.kind is Kind.PUBLISHER else subscribers
         side.append(token.node_name)
     return [
@@ -123,7 +123,7 @@ def format_topic(survey: Survey, name: str) -> str:
     for title, tokens in (("Publishers", publishers), ("Subscribers", subscriptions)):
         lines.append(f"{title}: " if tokens else f"{title}: None")
         for token in tokens:
-            type_text = f" [{short_type(token.type_name)}]" if mixed else ""
+            type_text = f" [{ros1_type(token.name, token.type_name)}]" if mixed else ""
             count = survey.dropped.get((token.zid, token.entity_id), 0)
             dropped = f", {count} dropped" if count else ""
             lines.append(f" * {token.node_name} ({survey.address(token)}){type_text}{dropped}")
@@ -133,7 +133,10 @@ def format_topic(survey: Survey, name: str) -> str:
 
 def entity_row(survey: Survey, token: Token) -> dict[str, str | int]:
     """Return a publisher or subscription as values for JSON."""
-    row: dict[str, str | int] = {"node": token.node_name, "type": short_type(token.type_name)}
+    row: dict[str, str | int] = {
+        "node": token.node_name,
+        "type": ros1_type(token.name, token.type_name),
+    }
     process = survey.process(token)
     if process is not None:
         row |= {"host": process.host, "pid": process.pid}

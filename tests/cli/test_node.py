@@ -73,7 +73,7 @@ def test_info(shell: Shell, talker: Node, network: Network) -> None:
         f"{'-' * 80}\nNode [/talker]\nPublications: \n"
         " * /robot/pose [geometry_msgs/PoseStamped]\n"
         " * /robot/text [std_msgs/String]\n"
-        " * /rosout [rcl_interfaces/Log]\n"
+        " * /rosout [rosgraph_msgs/Log]\n"
         "\nSubscriptions: \n * /cmd_vel [geometry_msgs/Twist]\n"
     )
     place = f"{driver.process.host}, pid {driver.process.pid}"

@@ -32,9 +32,9 @@ def test_a_node_on_its_way(network: Network, tmp_path: Path) -> None:
         done = rosz(tmp_path, *words, variables=variables)
         return f"{done.stdout}{done.stderr}" if done.returncode == 0 else ""
 
-    eventually(lambda: "/talker" in output("rosz node list"), "the node is there")
+    eventually(lambda: "/chatter" in output("rosz topic list"), "the node is there")
     steps = re.findall(r"^\$ (.*)\n((?:[^$].*\n)*)", session, re.MULTILINE)
     assert len(steps) == 4
     for line, printed in steps:
         shown = output(line)
-        assert printed in shown if line == "rosz node list" else shown == printed, line
+        assert printed in shown if line == "rosz node list" else shown == printed, (line, shown)

@@ -37,7 +37,7 @@ def test_verbose(shell: Shell, network: Network) -> None:
         "\nPublished topics:\n"
         " * /robot/pose [geometry_msgs/PoseStamped] 1 publisher\n"
         " * /robot/text [std_msgs/String] 1 publisher\n"
-        " * /rosout [rcl_interfaces/Log] 2 publishers\n"
+        " * /rosout [rosgraph_msgs/Log] 2 publishers\n"
         "\nSubscribed topics:\n"
         " * /cmd_vel [geometry_msgs/Twist] 2 subscribers\n"
         "\n"

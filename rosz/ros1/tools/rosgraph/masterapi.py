@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Any, NoReturn
 
 from rosz.errors import ParamError, ParamNotFound, RoszError, TransportError
-from rosz.names import ros1_type
+from rosz.names import is_of_action, ros1_type
 from rosz.params.replica import Params
 from rosz.ros1.exceptions import raised_as
 from rosz.ros1.state import params_of, ready_context, survey, token_uri
@@ -186,12 +186,17 @@ class Master:
 
 
 def _types(tokens: Iterable[Token]) -> Pairs:
-    types = {token.name: ros1_type(token.name, token.type_name) for token in tokens}
+    types = {
+        token.name: ros1_type(token.name, token.type_name)
+        for token in tokens
+        if not is_of_action(token.name)
+    }
     return [[name, type_name] for name, type_name in sorted(types.items())]
 
 
 def _with_nodes(tokens: Iterable[Token]) -> NamesWithNodes:
     names: dict[str, dict[str, None]] = {}
     for token in tokens:
-        names.setdefault(token.name, {})[token.node_name] = None
+        if not is_of_action(token.name):
+            names.setdefault(token.name, {})[token.node_name] = None
     return [[name, list(nodes)] for name, nodes in sorted(names.items())]

@@ -33,6 +33,8 @@ client = actionlib.SimpleActionClient("early", LookupTransformAction)
 print(client.wait_for_server(rospy.Duration(20)))
 print(client.send_goal_and_wait(LookupTransformGoal(target_frame="map"), rospy.Duration(20)))
 print(client.get_goal_status_text())
+state = rospy.get_master().getSystemState()[2]
+print(sorted({name for kind in state for name, _ in kind if name.startswith("/early/")}))
 
 buffer = tf2_ros.Buffer()
 listener = tf2_ros.TransformListener(buffer)
