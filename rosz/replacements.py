@@ -65,7 +65,7 @@ _PACKAGES = {
 _ALIAS = "after 'eval \"$(rosz env)\"' the shell has it"
 _ALIASES = {
     "catkin_create_pkg": "use 'rosz pkg create --bare'",
-    "catkin_make": "use 'rosz pkg check'; nothing needs building",
+    "catkin_make": "use 'rosz pkg check'; only C++ needs building (rosz help cpp)",
     **dict.fromkeys(("roscd", "rosed", "rosls", "rospack"), _ALIAS),
     "roswtf": "use 'rosz doctor'",
 }

@@ -147,13 +147,17 @@ def check_command(
     """Check packages: manifest, definitions, launch files, .cfg files and scripts.
 
     The exit code is 1 if there is an error; with --migrate, if something does not run here.
-    Options and targets of catkin_make are ignored.
+    With --setup, catkin builds packages with C++ programs (rosz help cpp). Options and targets of
+    catkin_make are ignored otherwise.
     """
-    from rosz.workspace import check, editor_folder, find_packages, write_stubs
+    from rosz.workspace import check, compiled_programs, editor_folder, find_packages, write_stubs
 
     cwd = Path.cwd()
     environment = Environment.read()
     folders = find_packages(_without_options(words or (), cwd), cwd, package_index(environment))
+    compiled = any(compiled_programs(folder) for folder in folders)
+    if setup and compiled and (code := _build(words or (), cwd)):
+        return code
     done = check(folders, environment, os.environ)
     if migrate:
         return _print_migration(folders, environment, _follow(done, len(folders)), as_json=json)
@@ -161,11 +165,13 @@ def check_command(
         checked = list(done)
         print_json(checked)
     else:
-        checked = _print_checked(done, len(folders), cwd, colored=environment.color)
+        checked = _print_checked(
+            done, len(folders), cwd, colored=environment.color, compiled=compiled
+        )
     if editor_folder(environment).is_dir():  # 'rosz env --editor' has written it once
         write_stubs(environment)
     if setup:
-        _write_setup(cwd)
+        _write_setup(cwd, replace=compiled)
     return int(any(problem.level == "error" for each in checked for problem in each.problems))
 
 
@@ -197,7 +203,7 @@ def _follow(done: Iterable[Checked], total: int) -> list[Checked]:
 
 
 def _print_checked(
-    done: Iterable[Checked], total: int, cwd: Path, *, colored: bool
+    done: Iterable[Checked], total: int, cwd: Path, *, colored: bool, compiled: bool
 ) -> list[Checked]:
     """Print errors, warnings, packages that are not there, and a summary.
 
@@ -217,7 +223,7 @@ def _print_checked(
     errors = sum(problem.level == "error" for problem in problems)
     counts = f"{count(errors, 'error')}, {count(len(plain) - errors, 'warning')}"
     more = f", {count(len(absent), 'package')} not there" if absent else ""
-    verdict = "" if errors or absent else "; nothing needs building"
+    verdict = "" if errors or absent or compiled else "; nothing needs building"
     sys.stdout.write(f"checked {count(len(checked), 'package')}: {counts}{more}{verdict}\n")
     return checked
 
@@ -278,7 +284,7 @@ def _page(page: Migration, cwd: Path) -> Iterator[str]:
     yield from _python2(programs, cwd)
     compiled = sum(map(len, page.compiled.values()))
     yield f"is C++: {compiled}" + (
-        "; rosz builds and runs no C++: it stays with ROS 1, or becomes a node of ROS 2 beside rosz"
+        "; catkin builds it (rosz help cpp), or it becomes a node of ROS 2 beside rosz"
         if compiled
         else ""
     )
@@ -323,19 +329,35 @@ def _shorten(place: str, cwd: Path) -> str:
     return place.removeprefix(f"{cwd}/")
 
 
-def _write_setup(cwd: Path) -> None:
+def _build(words: Sequence[str], cwd: Path) -> int:
+    """Build the C++ programs of the workspace, and return the exit code."""
+    from rosz.workspace import build
+
+    sys.stdout.flush()
+    code = build(_workspace_around(cwd), words, os.environ)
+    if code:
+        _write_setup(cwd, replace=True)
+    return int(bool(code))
+
+
+def _workspace_around(cwd: Path) -> Path:
+    for folder in (cwd, *cwd.parents):
+        if (folder / "src").is_dir():
+            return folder
+    raise NotFoundError(f"no workspace around {cwd}: expected a folder 'src' with packages")
+
+
+def _write_setup(cwd: Path, *, replace: bool) -> None:
     """Write the files that course documents source after catkin_make."""
     import shlex
 
     from rosz.cli.env import SHELLS
     from rosz.workspace import write_setup
 
-    workspace = next((f for f in (cwd, *cwd.parents) if (f / "src").is_dir()), None)
-    if workspace is None:
-        raise NotFoundError(f"no workspace around {cwd}: expected a folder 'src' with packages")
+    workspace = _workspace_around(cwd)
     lines: dict[str, str] = {}
     for shell in SHELLS:
         command = f"{shlex.quote(sys.executable)} -P -m rosz env {shell}"
         lines[shell] = f"{command} | source\n" if shell == "fish" else f'eval "$({command})"\n'
-    files = write_setup(workspace, lines)
+    files = write_setup(workspace, lines, replace=replace)
     sys.stdout.write(f"in a new shell: source {_shorten(str(files[0]), cwd)}\n")

@@ -110,12 +110,15 @@ def _write(folder: Path, files: Mapping[str, str]) -> None:
         raise LaunchError(f"cannot create '{error.filename}': {error.strerror}") from error
 
 
-def write_setup(workspace: Path, scripts: Mapping[str, str]) -> list[Path]:
+def write_setup(
+    workspace: Path, scripts: Mapping[str, str], *, replace: bool = False
+) -> list[Path]:
     """Write the files ``devel/setup.<shell>`` that users source after ``catkin_make``.
 
     Args:
         workspace: Folder that contains ``src``.
         scripts: Shell code that defines ROS 1's commands, by the suffix of the file.
+        replace: Whether files that catkin wrote are replaced.
 
     Returns:
         The files.
@@ -127,7 +130,8 @@ def write_setup(workspace: Path, scripts: Mapping[str, str]) -> list[Path]:
     source = shlex.quote(str(workspace / "src"))
     files = {folder / f"setup.{shell}": text for shell, text in scripts.items()}
     for file in files:
-        if file.exists() and not file.read_text("utf-8", "replace").startswith(_MARK):
+        ours = replace or not file.exists()
+        if not ours and not file.read_text("utf-8", "replace").startswith(_MARK):
             raise UsageError(
                 f"'{file}' was written by catkin and is kept; to let rosz write it, remove {folder}"
             )

@@ -147,11 +147,11 @@ def compiled_programs(folder: Path) -> dict[str, int]:
 
 
 def check_cmake(folder: Path) -> Iterator[Problem]:
-    """Yield a problem that names the C++ programs of a package, which rosz does not build."""
+    """Yield a problem that names the C++ programs of a package, which catkin builds."""
     programs = compiled_programs(folder)
     if programs:
         names = ", ".join(programs)
-        text = f"rosz does not build C++ programs, and has no C++ API: {names}"
+        text = f"C++ programs, which only 'catkin_make' builds (rosz help cpp): {names}"
         yield warning(folder / "CMakeLists.txt", text, min(programs.values()))
 
 

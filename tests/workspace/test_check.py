@@ -144,8 +144,8 @@ def test_manifests(workspace: Path, text: str, expected: str) -> None:
         (
             "CMakeLists.txt",
             "project(demo)\nadd_executable(talker src/talker.cpp)\n",
-            "demo/CMakeLists.txt:2: warning: rosz does not build C++ programs, and has no C++ API:"
-            " talker",
+            "demo/CMakeLists.txt:2: warning: C++ programs, which only 'catkin_make' builds (rosz"
+            " help cpp): talker",
         ),
         ("cfg/A.cfg!", "ParameterGenerator(\n", "demo/cfg/A.cfg:1:19: error: not valid Python"),
     ],
@@ -261,8 +261,8 @@ def test_compiled_programs_of_nodes_are_named_as_such(workspace: Path) -> None:
     put(workspace, "launch/a.launch", f"<launch>{node.format('x')}{node.format('y')}</launch>")
     text = "'talker' of package 'demo' is C++, and is not built"
     assert problems(workspace) == [
-        "demo/CMakeLists.txt:1: warning: rosz does not build C++ programs, and has no C++ API:"
-        " talker, b",
+        "demo/CMakeLists.txt:1: warning: C++ programs, which only 'catkin_make' builds (rosz"
+        " help cpp): talker, b",
         f"demo/launch/a.launch:1:9: error: {text}",
         f"demo/launch/a.launch:1:50: error: {text}",
     ]

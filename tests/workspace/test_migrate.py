@@ -73,8 +73,7 @@ def test_what_does_not_run(workspace: Path) -> None:
         "is Python 2: 1; convert with: 2to3 -w FILE",
         "    src/demo/scripts/old.py: line 2, 4, 6: print without parentheses;"
         " module 'urllib2' is Python 2",
-        "is C++: 1; rosz builds and runs no C++: it stays with ROS 1, or becomes a node of ROS 2"
-        " beside rosz",
+        "is C++: 1; catkin builds it (rosz help cpp), or it becomes a node of ROS 2 beside rosz",
         "    demo: demo_node",
         "other mistakes: 0",
         "package 'nowhere_pkg' is not there; needed by demo",
