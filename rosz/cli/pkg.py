@@ -171,7 +171,8 @@ def check_command(
     if editor_folder(environment).is_dir():  # 'rosz env --editor' has written it once
         write_stubs(environment)
     if setup:
-        _write_setup(cwd, replace=compiled)
+        file = _write_setup(cwd, replace=compiled)
+        sys.stdout.write(f"in a new shell: source {_shorten(str(file), cwd)}\n")
     return int(any(problem.level == "error" for each in checked for problem in each.problems))
 
 
@@ -347,8 +348,8 @@ def _workspace_around(cwd: Path) -> Path:
     raise NotFoundError(f"no workspace around {cwd}: expected a folder 'src' with packages")
 
 
-def _write_setup(cwd: Path, *, replace: bool) -> None:
-    """Write the files that course documents source after catkin_make."""
+def _write_setup(cwd: Path, *, replace: bool) -> Path:
+    """Write the files that course documents source after catkin_make; return the first one."""
     import shlex
 
     from rosz.cli.env import SHELLS
@@ -359,5 +360,4 @@ def _write_setup(cwd: Path, *, replace: bool) -> None:
     for shell in SHELLS:
         command = f"{shlex.quote(sys.executable)} -P -m rosz env {shell}"
         lines[shell] = f"{command} | source\n" if shell == "fish" else f'eval "$({command})"\n'
-    files = write_setup(workspace, lines, replace=replace)
-    sys.stdout.write(f"in a new shell: source {_shorten(str(files[0]), cwd)}\n")
+    return write_setup(workspace, lines, replace=replace)[0]

@@ -85,7 +85,21 @@ def run_command(
         chosen = make_command(workplace, package, executable, arguments or [], prefix)
     if debug:
         print_error(f"[rosz run] {' '.join(chosen.argv)}")
+    if not chosen.python:
+        _look_for_master(Path(chosen.argv[len(shlex.split(prefix))]), chosen.environ)
     _replace_process(chosen.argv, chosen.environ)
+
+
+def _look_for_master(program: Path, environ: dict[str, str]) -> None:
+    """Warn if a compiled program of ROS 1 has no master: it would wait for one."""
+    from rosz.bridges.ros1 import MASTER_PORT, running_master
+
+    uri = environ.get("ROS_MASTER_URI") or f"http://localhost:{MASTER_PORT}"
+    if b"libroscpp.so" in program.read_bytes() and not running_master({"ROS_MASTER_URI": uri}):
+        print_error(
+            f"WARNING: '{program}' needs a ROS 1 master, and none answers at {uri}: start"
+            " 'rosz core --ros1', or use 'rosz launch', which brings one (rosz help cpp)"
+        )
 
 
 def _replace_process(argv: tuple[str, ...], environ: dict[str, str]) -> NoReturn:

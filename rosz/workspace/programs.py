@@ -147,8 +147,9 @@ def compiled_programs(folder: Path) -> dict[str, int]:
 
 
 def check_cmake(folder: Path) -> Iterator[Problem]:
-    """Yield a problem that names the C++ programs of a package, which catkin builds."""
-    programs = compiled_programs(folder)
+    """Yield a problem that names the C++ programs of a package that are not built."""
+    built = Package(folder.name, folder).executables()
+    programs = {name: at for name, at in compiled_programs(folder).items() if name not in built}
     if programs:
         names = ", ".join(programs)
         text = f"C++ programs, which only 'catkin_make' builds (rosz help cpp): {names}"
