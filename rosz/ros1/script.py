@@ -137,11 +137,25 @@ def _excepthook(show: _Hook, main: ModuleType) -> _Hook:
             sys.stderr.write(f"ERROR: {_place(trace, main)}{error}\n")
             return
         show(kind, error.with_traceback(trace), trace)
-        advice = hint(error)
+        advice = hint(error) or _opencv_hint(error)
         if advice:
             sys.stderr.write(f"ERROR: {advice}\n")
 
     return hook
+
+
+def _opencv_hint(error: BaseException) -> str:
+    """Return the extra with the OpenCV that fits this machine; empty for other errors."""
+    if type(error).__module__ == "cv2" and "Rebuild the library" in str(error):
+        have, want = "-headless", "vision"
+    elif isinstance(error, ImportError) and "libGL.so" in str(error):
+        have, want = "", "vision-headless"
+    else:
+        return ""
+    return (
+        f"opencv-python{have} does not fit this machine; run: pip uninstall -y opencv-python{have}"
+        f" && pip install 'rosz[{want}]'"
+    )
 
 
 def _is_importing(trace: TracebackType | None, main: ModuleType) -> bool:

@@ -164,6 +164,30 @@ def test_python_2_names_are_explained_after_the_traceback(tmp_path: Path, script
     assert done.returncode == 1
 
 
+@pytest.mark.parametrize(
+    ("script", "advice"),
+    [
+        (
+            "import cv2, numpy\ncv2.imshow('camera', numpy.zeros((2, 2)))\n",
+            "pip uninstall -y opencv-python-headless && pip install 'rosz[vision]'",
+        ),
+        (
+            "raise ImportError('libGL.so.1: cannot open shared object file')\n",
+            "pip uninstall -y opencv-python && pip install 'rosz[vision-headless]'",
+        ),
+    ],
+    ids=["no windows", "no display"],
+)
+def test_an_opencv_for_another_machine_is_explained(
+    tmp_path: Path, script: str, advice: str
+) -> None:
+    pytest.importorskip("cv2")
+    done = run(tmp_path, script)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("ERROR: opencv-python")
+    assert done.stderr.endswith(f"; run: {advice}\n")
+
+
 @pytest.mark.parametrize("name", ["print_input", "xrange2"])
 def test_other_names_are_not_explained(tmp_path: Path, name: str) -> None:
     assert "ERROR:" not in run(tmp_path, f"{name}()\n").stderr
