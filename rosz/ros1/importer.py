@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
 _KINDS: dict[str, Kind] = {"msg": "msg", "srv": "srv", "action": "action"}
 _CFG = "cfg"
+_MESSAGES_ALONE = ("_msgs", "_srvs", "_interfaces")
 _RCLPY = "rclpy"
 _plain_build = builtins.__build_class__
 
@@ -246,11 +247,26 @@ class _FrontFinder(MetaPathFinder):
             return self._of_package(fullname, root, kind, inner, path)
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
+        if self._is_hidden(root):
+            return None
         if root in modules.MODULES or fullname in modules.MODULES:
             return self._of_rosz(fullname, root)
         if root in self._shipped and not rest:
             return _alias(fullname, lambda: self._of_messages(root))
         return None
+
+    def _is_hidden(self, root: str) -> bool:
+        """Return whether a package of the user hides the one that rosz ships.
+
+        Clients of the network, such as rospy and actionlib, are always those of rosz. Packages of
+        messages alone are not searched for code, since that takes time.
+        """
+        may_be = root in modules.HIDEABLE or (
+            root in self._shipped
+            and root not in modules.MODULES
+            and not root.endswith(_MESSAGES_ALONE)
+        )
+        return may_be and self.types.offers.find(root) is not None
 
     def _of_messages(self, package: str) -> ModuleType:
         """Return the module of a shipped package; its modules of types load when they are used.

@@ -44,6 +44,9 @@ _LIBRARIES = (
     " image_geometry interactive_markers laser_geometry ros_numpy"
     " resource_retriever rosserial_python smach smach_ros tf2_kdl tf_conversions"
 )
+HIDEABLE = frozenset(_LIBRARIES.split()) - {"PyKDL", "cv_bridge", "tf2_kdl"}
+"""Libraries in Python alone, which a package of the user may hide."""
+
 _NUMPY = {"numpy": "numpy"}
 _VISION = {"cv2": "vision", "numpy": "vision"}
 _EXTRAS = {

@@ -321,6 +321,28 @@ def test_a_package_of_a_shipped_name_may_add_types(tmp_path: Path, workspace: Pa
     assert run(code, tmp_path, workspace) == "rosz.msgs.std_msgs.msg\n"
 
 
+def test_a_package_of_the_user_hides_a_shipped_one(tmp_path: Path, workspace: Path) -> None:
+    """But not one that reaches the network."""
+    for name in ("rosapi", "smach", "actionlib"):
+        code = {f"src/{name}/__init__.py": "MINE = True\n", f"src/{name}/own.py": "DEEP = True\n"}
+        package(workspace, name, code)
+    assert (
+        run(
+            """
+            import rosz.ros1; rosz.ros1.install()
+            import actionlib, rosapi, rosapi.own, smach
+            from rosapi.srv import Topics
+            from smach.own import DEEP
+            print(rosapi.MINE, rosapi.own.DEEP, Topics._type, smach.MINE, DEEP)
+            print(actionlib.SimpleActionClient.__module__)
+            """,
+            tmp_path,
+            workspace,
+        )
+        == "True True rosapi/Topics True True\nrosz.ros1.client.actionlib.action_client\n"
+    )
+
+
 def test_install_twice_and_uninstall(tmp_path: Path, workspace: Path) -> None:
     code = """
         import sys
