@@ -182,11 +182,14 @@ def _versions() -> str:
     import platform
     from importlib.metadata import PackageNotFoundError, version
 
-    try:
-        own = version("rosz")
-    except PackageNotFoundError:
-        own = "of unknown version: it is not installed, but runs from its sources"
-    return f"rosz {own}, Zenoh {version('eclipse-zenoh')}, Python {platform.python_version()}"
+    def of(package: str) -> str:
+        try:
+            return version(package)
+        except PackageNotFoundError:
+            return "of unknown version (not installed, but on the path)"
+
+    python = platform.python_version()
+    return f"rosz {of('rosz')}, Zenoh {of('eclipse-zenoh')}, Python {python}"
 
 
 def _fail(what: object, code: int) -> int:

@@ -13,6 +13,7 @@ from rosz.cli import suggest
 from rosz.cli.console import (
     count,
     paint,
+    print_error,
     print_json,
     print_lines,
     print_result,
@@ -150,14 +151,20 @@ def check_command(
     With --setup, catkin builds packages with C++ programs (rosz help cpp). Options and targets of
     catkin_make are ignored otherwise.
     """
-    from rosz.workspace import check, compiled_programs, editor_folder, find_packages, write_stubs
+    from rosz.workspace import check, editor_folder, find_packages, is_compiled, write_stubs
 
     cwd = Path.cwd()
     environment = Environment.read()
-    folders = find_packages(_without_options(words or (), cwd), cwd, package_index(environment))
-    compiled = any(compiled_programs(folder) for folder in folders)
-    if setup and compiled and (code := _build(words or (), cwd)):
-        return code
+    targets = _without_options(words or (), cwd)
+    folders = find_packages(targets, cwd, package_index(environment))
+    compiled, unbuilt = any(map(is_compiled, folders)), False
+    if setup and compiled:
+        try:
+            if code := _build([word for word in words or () if word not in targets], cwd):
+                return code
+        except NotFoundError as error:  # programs in Python need no catkin
+            print_error(f"ERROR: {error}")
+            unbuilt = True
     done = check(folders, environment, os.environ)
     if migrate:
         return _print_migration(folders, environment, _follow(done, len(folders)), as_json=json)
@@ -173,7 +180,8 @@ def check_command(
     if setup:
         file = _write_setup(cwd, replace=compiled)
         sys.stdout.write(f"in a new shell: source {_shorten(str(file), cwd)}\n")
-    return int(any(problem.level == "error" for each in checked for problem in each.problems))
+    wrong = any(problem.level == "error" for each in checked for problem in each.problems)
+    return int(wrong or unbuilt)
 
 
 def _without_options(words: Sequence[str], cwd: Path) -> list[str]:

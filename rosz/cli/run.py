@@ -95,10 +95,15 @@ def _look_for_master(program: Path, environ: dict[str, str]) -> None:
     from rosz.bridges.ros1 import MASTER_PORT, running_master
 
     uri = environ.get("ROS_MASTER_URI") or f"http://localhost:{MASTER_PORT}"
-    if b"libroscpp.so" in program.read_bytes() and not running_master({"ROS_MASTER_URI": uri}):
+    try:
+        is_ros1 = b"libroscpp.so" in program.read_bytes()
+    except OSError:  # it may be executable and not readable
+        return
+    if is_ros1 and not running_master({"ROS_MASTER_URI": uri}):
         print_error(
             f"WARNING: '{program}' needs a ROS 1 master, and none answers at {uri}: start"
-            " 'rosz core --ros1', or use 'rosz launch', which brings one (rosz help cpp)"
+            " 'rosz core --ros1' on that machine, or use 'rosz launch', which brings one"
+            " (rosz help cpp)"
         )
 
 

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -294,8 +295,12 @@ class Context(Closing):
         self._forget_end()
         self._making = threading.RLock()
 
-    def pause_main_thread(self) -> None:
-        """Wait while the main thread must not run, in its signal handler; here there is no need."""
+    def pause_main_thread(self, frame: FrameType | None) -> None:
+        """Wait while the main thread must not run; here there is no need.
+
+        Args:
+            frame: Where a signal has interrupted the main thread.
+        """
 
     def wait_for_shutdown(self, timeout: float | None = None) -> bool:
         """Wait until the end has begun; any number of threads may.

@@ -95,7 +95,7 @@ class _Handler:
         self._contexts = [*(c for c in self._contexts if not c.is_shutdown), context]
         self._asked = False
 
-    def __call__(self, number: int, _frame: FrameType | None) -> None:
+    def __call__(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal; in the main thread, between two bytecodes."""
         self._ran.set()
         contexts = self._contexts
@@ -109,7 +109,7 @@ class _Handler:
         if not self._is_watching():
             self._react(number)
         for context in contexts:
-            context.pause_main_thread()
+            context.pause_main_thread(frame)
         if not any(context.cooperative for context in contexts):
             if number == signal.SIGINT:
                 raise KeyboardInterrupt

@@ -6,6 +6,7 @@ Each key changes the wanted speed by a step; the speed that is sent approaches i
 from __future__ import annotations
 
 import sys
+import threading
 
 from rosz.msgs.geometry_msgs.msg import Twist, Vector3
 from rosz.node import Node, serve_loggers
@@ -13,9 +14,9 @@ from rosz.turtlesim.teleop import Keyboard
 
 _LINEAR, _ANGULAR = 0, 1
 _STEPS = (0.01, 0.1)
-_LIMITS = {"burger": (0.22, 2.84)}
-_OTHER_LIMITS = (0.26, 1.82)
-"""Limits of the waffle, the waffle_pi, and models that are not known."""
+_BURGER = (0.22, 2.84)
+_LIMITS = {"waffle": (0.26, 1.82), "waffle_pi": (0.26, 1.82)}
+"""Limits by model; others have those of the burger."""
 _KEYS = {"w": (_LINEAR, 1), "x": (_LINEAR, -1), "a": (_ANGULAR, 1), "d": (_ANGULAR, -1)}
 _STOPS = frozenset("s ")
 _KEY_SECONDS = 0.1
@@ -47,10 +48,12 @@ class Turtlebot3Driver:
 
     def __init__(self, node: Node) -> None:
         model = node.params.get("model", "burger", type=str)
-        self._limits = _LIMITS.get(model, _OTHER_LIMITS)
+        self._limits = _LIMITS.get(model, _BURGER)
         self._sent = [0.0, 0.0]
         self.wanted = [0.0, 0.0]
         self._shown = 0
+        self._lock = threading.Lock()
+        self._stopped = False
         self._commands = node.publisher("cmd_vel", Twist, queue_size=10)
 
     def press(self, key: str) -> None:
@@ -64,15 +67,19 @@ class Turtlebot3Driver:
         elif key in _STOPS:
             self.wanted, self._sent = [0.0, 0.0], [0.0, 0.0]
             self._show()
-        for axis, wanted in enumerate(self.wanted):
-            most = _STEPS[axis] / 2
-            self._sent[axis] += max(-most, min(most, wanted - self._sent[axis]))
-        self._publish()
+        with self._lock:
+            if self._stopped:
+                return
+            for axis, wanted in enumerate(self.wanted):
+                most = _STEPS[axis] / 2
+                self._sent[axis] += max(-most, min(most, wanted - self._sent[axis]))
+            self._publish()
 
     def stop(self) -> None:
-        """Send the command to stand still."""
-        self.wanted, self._sent = [0.0, 0.0], [0.0, 0.0]
-        self._publish()
+        """Send the command to stand still, which is the last one."""
+        with self._lock:
+            self._stopped, self._sent = True, [0.0, 0.0]
+            self._publish()
 
     def _publish(self) -> None:
         linear, angular = self._sent

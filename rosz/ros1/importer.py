@@ -248,7 +248,8 @@ class _FrontFinder(MetaPathFinder):
         if first == _CFG:
             return self._of_cfg(fullname, root, inner, path)
         if self._is_hidden(root):
-            return None
+            # It comes before one that is installed, as catkin's devel space does.
+            return _EndFinder(self.types).find_spec(fullname, path) if path is None else None
         if root in modules.MODULES or fullname in modules.MODULES:
             return self._of_rosz(fullname, root)
         if root in self._shipped and not rest:

@@ -148,7 +148,11 @@ def _opencv_hint(error: BaseException) -> str:
     """Return the extra with the OpenCV that fits this machine; empty for other errors."""
     if type(error).__module__ == "cv2" and "Rebuild the library" in str(error):
         have, want = "-headless", "vision"
-    elif isinstance(error, ImportError) and "libGL.so" in str(error):
+    elif (
+        isinstance(error, ImportError)
+        and "libGL.so" in str(error)
+        and any("cv2" in frame.f_code.co_filename for frame, _ in walk_tb(error.__traceback__))
+    ):
         have, want = "", "vision-headless"
     else:
         return ""

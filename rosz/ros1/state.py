@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosz import remap
@@ -128,10 +129,18 @@ class _Context(Context):
         run_hooks(reason or self.reason or "atexit")
         super().shutdown(reason)
 
-    def pause_main_thread(self) -> None:
-        """Let the hooks run alone, as in rospy, where they run in the signal handler."""
-        state.lifecycle.wait_closing(_READY_SECONDS)
-        run_hooks(self.reason)
+    def pause_main_thread(self, frame: FrameType | None) -> None:
+        """Let the hooks run alone, as in rospy, where they run in the signal handler.
+
+        Not where the main thread may hold a lock that the hooks need: in rosz and in logging.
+        There it goes on until it asks `is_shutdown`.
+        """
+        while frame is not None and (name := frame.f_globals.get("__name__")) != "__main__":
+            if str(name).partition(".")[0] in {"rosz", "logging"}:
+                return
+            frame = frame.f_back
+        if state.lifecycle.wait_closing(_READY_SECONDS):
+            run_hooks(self.reason)
 
 
 def run_hooks(reason: str) -> None:

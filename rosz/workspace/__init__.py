@@ -19,6 +19,6 @@ if TYPE_CHECKING:
     from rosz.workspace.generate import Generator
     from rosz.workspace.migration import Migration, migrate
     from rosz.workspace.problem import Problem
-    from rosz.workspace.programs import compiled_programs
+    from rosz.workspace.programs import is_compiled
 else:
     __getattr__ = exports_of(__name__)

@@ -39,7 +39,7 @@ def build(workspace: Path, words: Sequence[str], environ: Mapping[str, str]) -> 
     catkin = shutil.which("catkin_make", path=environ["PATH"])
     compiler = environ.get("CXX") or shutil.which("c++", path=environ["PATH"])
     # The headers are beside it: in /usr, or in /opt/ros/noetic.
-    header = Path(catkin).parent.parent / "include/ros/ros.h" if catkin else None
+    header = Path(catkin).resolve().parent.parent / "include/ros/ros.h" if catkin else None
     there = {"catkin": catkin, "a C++ compiler": compiler, "roscpp": header and header.exists()}
     absent = [name for name, found in there.items() if not found]
     if catkin is None or absent:
@@ -47,12 +47,12 @@ def build(workspace: Path, words: Sequence[str], environ: Mapping[str, str]) -> 
             f"C++ programs are not built without {' and '.join(absent)}; see 'rosz help cpp', and"
             f" type:\nsudo apt install {_PACKAGES}"
         )
-    command = [catkin, *words]
+    command = [catkin]
     # CMake looks for any python3, and the one of rosz has no catkin_pkg.
     first = Path(catkin).read_text("utf-8", "replace").partition("\n")[0]
     if first.startswith("#!/") and "python" in first and "env " not in first:
         command.append(f"-DPYTHON_EXECUTABLE={first[2:].split()[0]}")
-    return subprocess.run(command, cwd=workspace, env=environ, check=False).returncode
+    return subprocess.run([*command, *words], cwd=workspace, env=environ, check=False).returncode
 
 
 def _without_ours(value: str) -> str:

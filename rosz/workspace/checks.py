@@ -76,7 +76,7 @@ def check(
     for folder, package in packages.items():
         problems = [*_check_manifest(folder), *name_problems.get(folder, ())]
         problems += check_scripts(folder)
-        problems += check_cmake(folder)
+        problems += check_cmake(package or Package(folder.name, folder))
         if package is not None:
             problems += check_entry_points(package)
             problems += _check_definitions(folder, package.name, catalog)

@@ -32,6 +32,7 @@ _BINARY = b"\x7fELF"
 _EXECUTABLE = re.compile(
     rb"^\s*(?:catkin_|cuda_|rosbuild_)?add_executable\s*\(\s*([^\s)]+)", re.MULTILINE
 )
+_COMPILED = re.compile(rb"^\s*(?:\w+_)?add_(?:executable|library)\s*\(", re.MULTILINE)
 _PROJECT = re.compile(rb"^\s*project\s*\(\s*([^\s)]+)", re.MULTILINE)
 _CFG_TIMEOUT = 20.0
 _GENERATOR = b"ParameterGenerator"
@@ -146,9 +147,17 @@ def compiled_programs(folder: Path) -> dict[str, int]:
     }
 
 
-def check_cmake(folder: Path) -> Iterator[Problem]:
+def is_compiled(folder: Path) -> bool:
+    """Return whether a package has C++ programs or libraries."""
+    try:
+        return _COMPILED.search((folder / "CMakeLists.txt").read_bytes()) is not None
+    except OSError:
+        return False
+
+
+def check_cmake(package: Package) -> Iterator[Problem]:
     """Yield a problem that names the C++ programs of a package that are not built."""
-    built = Package(folder.name, folder).executables()
+    folder, built = package.path, package.executables()
     programs = {name: at for name, at in compiled_programs(folder).items() if name not in built}
     if programs:
         names = ", ".join(programs)

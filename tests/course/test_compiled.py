@@ -121,7 +121,7 @@ def test_the_corrected_publisher(compiled: Desk, program: str) -> None:
     (package / "src" / "abc_node").unlink()
     one, two = compiled.terminal(), compiled.terminal()
     one.start("rosrun abc_qa abc_node &")
-    one.wait_for("start 'rosz core --ros1'", 1, _SLOW)
+    one.wait_for("start 'rosz core --ros1' on that machine", 1, _SLOW)
     one.wait_for("Failed to contact master", 1, _SLOW)
     _start_core(compiled)
     assert two.type("rostopic echo -n 2 /abc_topic", _SLOW) == "data: 0\n---\ndata: 0\n---\n"

@@ -172,7 +172,7 @@ def test_python_2_names_are_explained_after_the_traceback(tmp_path: Path, script
             "pip uninstall -y opencv-python-headless && pip install 'rosz[vision]'",
         ),
         (
-            "raise ImportError('libGL.so.1: cannot open shared object file')\n",
+            "import broken_cv2\n",
             "pip uninstall -y opencv-python && pip install 'rosz[vision-headless]'",
         ),
     ],
@@ -182,6 +182,8 @@ def test_an_opencv_for_another_machine_is_explained(
     tmp_path: Path, script: str, advice: str
 ) -> None:
     pytest.importorskip("cv2")
+    text = "raise ImportError('libGL.so.1: cannot open shared object file')\n"
+    (tmp_path / "broken_cv2.py").write_text(text)
     done = run(tmp_path, script)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith("ERROR: opencv-python")

@@ -64,6 +64,19 @@ def test_without_catkin_there_is_the_line_to_type(tmp_path: Path) -> None:
 
 
 @pytest.mark.system
+def test_without_catkin_python_is_checked(tmp_path: Path) -> None:
+    package = tmp_path / "src" / "abc_qa"
+    package.mkdir(parents=True)
+    (package / "package.xml").write_text(_MANIFEST)
+    (package / "CMakeLists.txt").write_text(_CMAKE)
+    done = rosz(tmp_path, "pkg", "check", "--setup", variables={"PATH": str(tmp_path)})
+    assert done.returncode == 1
+    assert done.stderr.startswith("ERROR: C++ programs are not built without catkin")
+    assert "checked 1 package: 0 errors, 1 warning" in done.stdout
+    assert (tmp_path / "devel" / "setup.bash").is_file()
+
+
+@pytest.mark.system
 @pytest.mark.skipif(not shutil.which("catkin_make", path="/usr/bin"), reason="no catkin")
 def test_catkin_builds_what_the_course_prints(tmp_path: Path) -> None:
     """The broken program first, whose errors are the compiler's; then the mended one."""
@@ -84,7 +97,7 @@ def test_catkin_builds_what_the_course_prints(tmp_path: Path) -> None:
 @pytest.mark.skipif(not shutil.which("catkin_make", path="/usr/bin"), reason="no catkin")
 def test_catkin_make_makes_headers_and_finds_programs(tmp_path: Path) -> None:
     """Headers of messages, services and settings; what is built is found, and no more named."""
-    package = tmp_path / "src" / "lab"
+    package = tmp_path / "src" / "cloned-lab"
     files = {
         "package.xml": _MANIFEST.replace("abc_qa", "lab").replace(
             "</package>", "<run_depend>message_runtime</run_depend></package>"
@@ -105,9 +118,8 @@ def test_catkin_make_makes_headers_and_finds_programs(tmp_path: Path) -> None:
     made = rosz(tmp_path, "pkg", "check", "--setup", variables=variables)
     assert made.returncode == 0, made.stdout + made.stderr
     assert "Built target reset_client" in made.stdout
-    assert made.stdout.endswith(
-        "checked 1 package: 0 errors, 0 warnings\nin a new shell: source devel/setup.bash\n"
-    )
+    assert "only 'catkin_make' builds" not in made.stdout
+    assert made.stdout.endswith("\nin a new shell: source devel/setup.bash\n")
     assert (tmp_path / "devel" / "setup.bash").read_text().count("rosz env bash") == 1
     packages = {**variables, "ROSZ_PACKAGE_PATH": str(tmp_path / "src")}
     assert rosz(tmp_path, "run", "lab", "reset_client", variables=packages).stdout == "8 5\n"

@@ -252,6 +252,9 @@ class ActionServer(actions.ActionlibServer):
 
     def start(self) -> None:
         """Begin to receive goals; a started server does nothing."""
+        if isinstance(self.node, _LaterNode):
+            self.node = state.node()
+            self.name = self.node.resolve(names.canonical(self.ns))  # a private one is known now
         super().start()
         self.started = True
 
@@ -299,7 +302,7 @@ class SimpleActionServer(actions.SimpleActionServer):
     def register_goal_callback(self, cb: Callable[[], object]) -> None:
         """Call a function when there is a new goal to accept."""
         if self.execute_callback is not None:
-            self.action_server.node.log.warning(
+            rospy.logwarn(
                 "register_goal_callback() has no effect: the server has an execute callback"
             )
         else:

@@ -40,7 +40,8 @@ from rosz.ros1.exceptions import (
     ROSSerializationException,
 )
 from rosz.ros1.modules import attribute
-from rosz.ros1.state import has_node, is_shutdown, node_uri, run_hooks, state
+from rosz.ros1.state import has_node, node_uri, run_hooks, state
+from rosz.ros1.state import is_shutdown as node_is_shutdown
 from rosz.session import clamp_timeout
 from rosz.time import DurationValue
 
@@ -116,6 +117,16 @@ atexit.register(run_hooks, "atexit")
 is_initialized = has_node
 
 
+def is_shutdown() -> bool:
+    """Return whether the node is shut down.
+
+    In the main thread it waits for hooks that run, up to 10 s: as in rospy, they run alone.
+    """
+    if state.lifecycle.closing and threading.current_thread() is threading.main_thread():
+        run_hooks("")
+    return node_is_shutdown()
+
+
 is_shutdown_requested = is_shutdown
 
 
@@ -159,7 +170,7 @@ def _add_hook(stage: str, hook: Callable[..., object], *late: str) -> None:
             f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}"
         )
     with state.lock:
-        if not is_shutdown():
+        if not node_is_shutdown():
             state.hooks[stage].append(hook)
             return
     hook(*late)
@@ -230,7 +241,7 @@ _missing = attribute("rospy.core", sys.modules[__name__], {})
 
 def __getattr__(name: str) -> Any:
     """Return rospy's variable for the shutdown, which programs read."""
-    return is_shutdown() if name == "_in_shutdown" else _missing(name)
+    return node_is_shutdown() if name == "_in_shutdown" else _missing(name)
 
 
 # The environment.

@@ -75,7 +75,17 @@ def _function(name: str) -> Callable[..., Any]:
     return function
 
 
-Arcball = _function("Arcball")
+def Arcball(initial: Numbers = None) -> Any:  # noqa: N802  # ROS 1's class
+    """Return a ball that a pointer turns; see the class in the library ``transformations``.
+
+    Args:
+        initial: First rotation, a quaternion or a matrix; none when not given.
+    """
+    if np.shape(initial) == (4,):
+        initial = _to_library(initial)
+    return _library.Arcball(initial)
+
+
 arcball_constrain_to_axis = _function("arcball_constrain_to_axis")
 arcball_map_to_sphere = _function("arcball_map_to_sphere")
 arcball_nearest_axis = _function("arcball_nearest_axis")

@@ -150,7 +150,10 @@ class _Broadcaster:
             ROSInitException: ``rospy.init_node`` was not called.
         """
         if self._broadcaster is None:
-            self._open(state.node())
+            node = state.node()
+            if state.is_shutdown():
+                return
+            self._open(node)
         self._broadcaster.send(transform)
 
 

@@ -22,6 +22,7 @@ def stamped(parent, child):
 
 
 server = actionlib.SimpleActionServer("early", LookupTransformAction, execute, auto_start=False)
+private = actionlib.SimpleActionServer("~do", LookupTransformAction, execute, auto_start=False)
 moving, static, old = tf2_ros.TransformBroadcaster(), tf2_ros.StaticTransformBroadcaster(), tf.TransformBroadcaster()
 try:
     moving.sendTransform(TransformStamped())
@@ -29,6 +30,7 @@ except rospy.ROSException:
     print("too early")
 rospy.init_node("early")
 server.start()
+private.start()
 client = actionlib.SimpleActionClient("early", LookupTransformAction)
 print(client.wait_for_server(rospy.Duration(20)))
 print(client.send_goal_and_wait(LookupTransformGoal(target_frame="map"), rospy.Duration(20)))
