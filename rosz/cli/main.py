@@ -178,7 +178,7 @@ def _invoke(app: App, argv: list[str], program: str) -> int:
 
 
 def _versions() -> str:
-    """Return the versions of rosz and of what it runs on, as a report of a fault needs them."""
+    """Return the versions that a report of a fault needs: of rosz, Zenoh and Python."""
     import platform
     from importlib.metadata import PackageNotFoundError, version
 

@@ -296,7 +296,7 @@ class Context(Closing):
         self._making = threading.RLock()
 
     def pause_main_thread(self, frame: FrameType | None) -> None:
-        """Wait while the main thread must not run; here there is no need.
+        """Return at once; a subclass may keep the main thread waiting in its signal handler.
 
         Args:
             frame: Where a signal has interrupted the main thread.

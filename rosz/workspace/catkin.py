@@ -18,7 +18,7 @@ _PACKAGES = (
 
 
 def build(workspace: Path, words: Sequence[str], environ: Mapping[str, str]) -> int:
-    """Run catkin's own ``catkin_make``, which prints what it does and what compilers say.
+    """Run catkin's own ``catkin_make``, which prints its steps and the errors of the compiler.
 
     Args:
         workspace: Folder that contains ``src``.
@@ -41,7 +41,7 @@ def build(workspace: Path, words: Sequence[str], environ: Mapping[str, str]) -> 
     # The headers are beside it: in /usr, or in /opt/ros/noetic.
     header = Path(catkin).resolve().parent.parent / "include/ros/ros.h" if catkin else None
     there = {"catkin": catkin, "a C++ compiler": compiler, "roscpp": header and header.exists()}
-    absent = [name for name, found in there.items() if not found]
+    absent = [name for name, place in there.items() if not place]
     if catkin is None or absent:
         raise NotFoundError(
             f"C++ programs are not built without {' and '.join(absent)}; see 'rosz help cpp', and"

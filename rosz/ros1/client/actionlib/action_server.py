@@ -213,7 +213,7 @@ class ActionServer(actions.ActionlibServer):
         started: Whether the server receives goals.
 
     Raises:
-        ROSInitException: It is to start, and ``rospy.init_node`` was not called.
+        ROSInitException: ``auto_start`` is true, and ``rospy.init_node`` was not called.
         ActionException: The class is not that of an action.
     """
 
